@@ -1,0 +1,112 @@
+// The values that extraction exchanges: jobs (what an extractor gets), candidates (what it returns), and the
+// features of a whole image (what tracking sees; nothing of the cutting is left in them).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/ids.h"
+#include "core/image.h"
+#include "geometry/camera.h"
+
+namespace tessera {
+
+// What decides the features of an image. Carried in every job, so that all extractors of a pool, and several robots
+// that share it, need no configuration of their own.
+struct FeatureOptions {
+  int num_features = 2000;     // keypoints per image after selection
+  int num_levels = 8;          // pyramid levels; each is 5/6 of the one below in both directions (scale 1.2)
+  int min_score = 7;           // lowest corner score (FAST: intensity difference, 0..255) that counts
+  int max_disparity_px = 128;  // stereo: widest search along the row, in level-0 pixels
+
+  bool operator==(const FeatureOptions&) const = default;
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+using Descriptor = std::array<uint64_t, 4>;  // 256 binary tests; compare by Hamming distance
+
+// Number of differing bits, 0..256.
+inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
+  int distance = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    distance += __builtin_popcountll(a[i] ^ b[i]);
+  }
+  return distance;
+}
+
+struct Keypoint {
+  float x_px = 0.0F;  // position in the (left) image, level-0 pixels
+  float y_px = 0.0F;
+  float right_x_px = -1.0F;  // stereo: column of the match in the right image, level-0 pixels; < 0: no match
+  float depth_m = 0.0F;      // RGB-D: depth (z) at the keypoint; 0: unknown
+  uint16_t score = 0;        // strength; higher is better
+  uint8_t level = 0;         // pyramid level; one pixel there is 1.2^level pixels here
+  uint8_t angle = 0;         // orientation in 1/256 turn, from +x (right) towards +y (down)
+
+  bool operator==(const Keypoint&) const = default;
+};
+
+// The features of one image: keypoints[i] belongs to descriptors[i]; order fixed by (level, y, x).
+struct FeatureFrame {
+  FrameId frame;
+  int64_t utime_us = 0;    // when the image was taken
+  int64_t arrival_us = 0;  // wall clock at which the dispatcher first heard of the frame; for measuring only
+  CameraCalibration calibration;
+  std::vector<Keypoint> keypoints;
+  std::vector<Descriptor> descriptors;
+};
+
+// One unit of work: detect and describe the candidates of one tile, over a range of pyramid levels.
+struct TileJob {
+  FrameId frame;
+  int64_t utime_us = 0;
+  int64_t arrival_us = 0;
+  int32_t tile = 0;       // 0 .. num_tiles - 1
+  int32_t num_tiles = 1;  // jobs that make up this frame
+  CameraCalibration calibration;
+  FeatureOptions options;
+  int32_t first_level = 0;  // levels first_level .. last_level are to be extracted
+  int32_t last_level = 0;
+  Rect core;         // level-0 rectangle that the tile owns: it answers for the cells whose centre lies in it
+  Rect left_rect;    // level-0 pixels in `left`: the core and the margins it needs
+  GrayImage left;    // left_rect of the left image
+  Rect right_rect;   // stereo: level-0 pixels in `right`
+  GrayImage right;   // stereo: right_rect of the right image
+  Rect depth_rect;   // RGB-D: level-0 pixels in `depth`
+  DepthImage depth;  // RGB-D: depth_rect of the depth image
+
+  bool operator==(const TileJob&) const = default;
+};
+
+// A keypoint that may be selected.
+struct Candidate {
+  int16_t x = 0;  // pixel of its pyramid level, in coordinates of the whole level image
+  int16_t y = 0;
+  uint8_t level = 0;
+  uint8_t angle = 0;        // 1/256 turn
+  uint16_t score = 0;       // strength
+  float right_x_px = -1.0F; // as in Keypoint
+  float depth_m = 0.0F;
+
+  bool operator==(const Candidate&) const = default;
+};
+
+// The answer to a TileJob: candidates[i] belongs to descriptors[i].
+struct TileFeatures {
+  FrameId frame;
+  int64_t utime_us = 0;
+  int64_t arrival_us = 0;
+  int32_t tile = 0;
+  int32_t num_tiles = 1;
+  CameraCalibration calibration;
+  FeatureOptions options;
+  std::vector<Candidate> candidates;
+  std::vector<Descriptor> descriptors;
+
+  bool operator==(const TileFeatures&) const = default;
+};
+
+}  // namespace tessera

@@ -1,0 +1,47 @@
+// The camera as every stage behind the camera stage sees it: images are already undistorted and rectified, so it
+// is a pinhole, and the right camera of a stereo pair looks along the same rows.
+//
+// Camera frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top left pixel.
+//
+//   u = fx x/z + cx,   v = fy y/z + cy                          [px]
+//   u_right = u - fx * baseline / z                             [px]
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+namespace tessera {
+
+enum class SensorType { kMono = 0, kStereo = 1, kRgbd = 2 };
+
+// "mono", "stereo", "rgbd"
+std::string ToString(SensorType sensor);
+
+struct CameraCalibration {
+  SensorType sensor = SensorType::kMono;
+  int width_px = 0;
+  int height_px = 0;
+  double fx_px = 0.0;
+  double fy_px = 0.0;
+  double cx_px = 0.0;
+  double cy_px = 0.0;
+  double baseline_m = 0.0;    // stereo: distance from left to right camera; otherwise 0
+  double depth_unit_m = 0.0;  // RGB-D: metres per count of the depth image; otherwise 0
+
+  bool operator==(const CameraCalibration&) const = default;
+
+  // Empty if all is well, else one sentence that says what is out of range.
+  std::string Check() const;
+
+  // Pixel of a point in the camera frame; its z must be > 0.
+  Eigen::Vector2d Project(const Eigen::Vector3d& point_in_camera) const {
+    return {fx_px * point_in_camera.x() / point_in_camera.z() + cx_px,
+            fy_px * point_in_camera.y() / point_in_camera.z() + cy_px};
+  }
+  // Ray through the pixel, scaled to z = 1.
+  Eigen::Vector3d Ray(const Eigen::Vector2d& pixel) const {
+    return {(pixel.x() - cx_px) / fx_px, (pixel.y() - cy_px) / fy_px, 1.0};
+  }
+};
+
+}  // namespace tessera

@@ -1,0 +1,43 @@
+// What tracking tells the rest: the pose of each frame (POSE) and the frames worth keeping (KEYFRAME).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/ids.h"
+#include "features/feature_types.h"
+#include "geometry/rigid3.h"
+
+namespace tessera {
+
+enum class TrackingState {
+  kInitializing = 0,  // no map yet: the frame has no pose
+  kTracked = 1,       // the pose is estimated
+  kLost = 2,          // there was a map, but this frame could not be placed in it: no pose
+};
+
+// The pose of one frame as it was known at the time. Every frame that reaches the tracker gets one.
+struct PoseEstimate {
+  FrameId frame;
+  int64_t utime_us = 0;    // when the image was taken
+  int64_t arrival_us = 0;  // see FeatureFrame
+  TrackingState state = TrackingState::kInitializing;
+  Rigid3 world_from_camera;           // valid if tracked. Mono: units of the map
+  KeyframeId reference_keyframe;      // the keyframe that the pose is stored relative to
+  Rigid3 reference_from_camera;       // pose relative to it: what is left true when the keyframe moves
+  int32_t num_features = 0;           // keypoints of the frame
+  int32_t num_matches = 0;            // matched to landmarks
+  int32_t num_inliers = 0;            // of those, consistent with the pose
+  int32_t num_landmarks = 0;          // landmarks in the map
+  bool is_keyframe = false;
+};
+
+// A frame that becomes part of the map. Its features never change; its pose does, later, in the mapper.
+struct KeyframeObservation {
+  KeyframeId id;
+  FeatureFrame features;
+  Rigid3 world_from_camera;                 // the tracker's estimate
+  std::vector<LandmarkId> landmarks;        // by keypoint: the landmark it saw; invalid: none
+};
+
+}  // namespace tessera
