@@ -62,6 +62,7 @@ struct FeatureFrame {
 // One unit of work: detect and describe the candidates of one tile, over a range of pyramid levels.
 struct TileJob {
   FrameId frame;
+  FrameId previous_frame;  // the frame before it that was not dropped; invalid: it is the first
   int64_t utime_us = 0;
   int64_t arrival_us = 0;
   int32_t tile = 0;       // 0 .. num_tiles - 1
@@ -97,6 +98,7 @@ struct Candidate {
 // The answer to a TileJob: candidates[i] belongs to descriptors[i].
 struct TileFeatures {
   FrameId frame;
+  FrameId previous_frame;  // as in TileJob: the order in which frames are released
   int64_t utime_us = 0;
   int64_t arrival_us = 0;
   int32_t tile = 0;
