@@ -1,0 +1,175 @@
+#include "stages/dispatcher/dispatcher_stage.h"
+
+#include <algorithm>
+
+#include "core/errors.h"
+#include "map/tracking_types.h"
+#include "transport/stage_messages.h"
+
+namespace tessera {
+namespace {
+
+// Frames that may overtake their CALIBRATION message, which travels on another bus.
+constexpr size_t kMaxFramesBeforeCalibration = 16;
+// After the source's end, a frame that has not come for this long won't come any more.
+constexpr int64_t kLastFrameTimeoutUs = 5'000'000;
+
+int64_t NowUs() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+WorkQueueOptions OptionsFrom(const Settings& settings) {
+  WorkQueueOptions options;
+  options.grid = ParseTileGrid(settings.Get<std::string>("dispatcher.tiles"));
+  options.coarse_levels_from = settings.Get<int>("dispatcher.coarse_levels_from");
+  options.max_queued_frames = settings.Get<int>("dispatcher.max_queued_frames");
+  options.max_frames_in_flight = settings.Get<int>("dispatcher.max_frames_in_flight");
+  options.jobs_per_extractor = settings.Get<int>("dispatcher.jobs_per_extractor");
+  options.late_us = 1000LL * settings.Get<int>("dispatcher.late_ms");
+  options.silent_us = 1000LL * settings.Get<int>("dispatcher.silent_ms");
+  options.features.num_features = settings.Get<int>("features.num_features");
+  options.features.num_levels = settings.Get<int>("features.num_levels");
+  options.features.min_score = settings.Get<int>("features.min_score");
+  options.features.max_disparity_px = settings.Get<int>("features.max_disparity_px");
+  if (const std::string problem = options.Check(); !problem.empty()) {
+    throw InputError(problem);
+  }
+  return options;
+}
+
+}  // namespace
+
+DispatcherStage::DispatcherStage(StageContext& context)
+    : context_(context), queue_(OptionsFrom(context.settings())) {
+  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  context.Subscribe<CameraCalibration>(
+      kCalibrationChannel, [this](const CameraCalibration& calibration, const MessageInfo&) { OnCalibration(calibration); });
+  context.Subscribe<CameraFrame>(
+      kCameraChannel, [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
+  context.Subscribe<ExtractorReady>(kExtractorReadyChannel, [this](const ExtractorReady& ready, const MessageInfo&) {
+    queue_.HearExtractor(ready.extractor, ready.epoch_us, NowUs());
+    GiveWork();
+  });
+  context.Subscribe<TileAck>(kTileAckChannel, [this](const TileAck& ack, const MessageInfo&) {
+    queue_.Acknowledge(ack.frame, ack.tiles);
+    GiveWork();
+  });
+  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+    queue_.MarkTracked(pose.frame);
+    GiveWork();
+  });
+  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
+    if (end.stage == "camera" && !source_end_) {
+      source_end_ = end;
+      last_activity_us_ = NowUs();
+      FinishIfDone();
+    }
+  });
+  context.Every(std::chrono::milliseconds(200), [this] { Watch(); });
+}
+
+void DispatcherStage::OnCalibration(const CameraCalibration& calibration) {
+  if (calibration_ && *calibration_ != calibration) {
+    context_.ReportError("the calibration changed within a stream; the new one is ignored: restart the stack for another camera");
+    return;
+  }
+  if (calibration_) {
+    return;
+  }
+  calibration_ = calibration;
+  for (const auto& [frame, arrival_us] : before_calibration_) {
+    QueueFrame(frame, arrival_us);
+  }
+  before_calibration_.clear();
+  GiveWork();
+}
+
+void DispatcherStage::OnFrame(const CameraFrame& frame, const MessageInfo& info) {
+  last_activity_us_ = NowUs();
+  if (frame.id <= newest_) {
+    context_.ReportError("frame " + std::to_string(frame.id.value) + " came after frame " +
+                         std::to_string(newest_.value) + " and is ignored: is there a second camera?");
+    return;
+  }
+  if (newest_.valid() && frame.id.value > newest_.value + 1) {
+    // Lost on the way from the camera, and nobody could repair it.
+    num_dropped_ += frame.id.value - newest_.value - 1;
+    context_.AddDropped(frame.id.value - newest_.value - 1);
+  }
+  newest_ = frame.id;
+  if (!calibration_) {
+    if (before_calibration_.size() < kMaxFramesBeforeCalibration) {
+      before_calibration_.emplace_back(frame, info.arrival_us);
+    } else {
+      ++num_dropped_;
+      context_.AddDropped(1);
+    }
+    return;
+  }
+  QueueFrame(frame, info.arrival_us);
+  GiveWork();
+}
+
+void DispatcherStage::QueueFrame(const CameraFrame& frame, int64_t arrival_us) {
+  if (frame.left.width != calibration_->width_px || frame.left.height != calibration_->height_px ||
+      frame.sensor != calibration_->sensor) {
+    ++num_dropped_;
+    context_.AddDropped(1);
+    context_.ReportError("frame " + std::to_string(frame.id.value) + " is " + std::to_string(frame.left.width) + "x" +
+                         std::to_string(frame.left.height) + " px, but the calibration says " +
+                         std::to_string(calibration_->width_px) + "x" + std::to_string(calibration_->height_px) +
+                         ": the frame is dropped");
+    return;
+  }
+  if (!queue_.AddFrame(frame, *calibration_, arrival_us)) {
+    ++num_dropped_;
+    context_.AddDropped(1);
+    context_.ReportError("the pipeline is slower than the source: frame " + std::to_string(frame.id.value) +
+                         " is dropped (more extractors, fewer features or a slower pace help)");
+  }
+}
+
+// Gives out jobs while there are any and somebody is free.
+void DispatcherStage::GiveWork() {
+  while (queue_.CanGive()) {
+    const StepTimer timer(context_);
+    const auto [extractor, job] = queue_.GiveNext(NowUs());
+    if (!tiles_.contains(extractor)) {
+      tiles_[extractor] = context_.Advertise<TileJob>(TileChannel(extractor));
+    }
+    tiles_[extractor].Publish(*job);
+  }
+  context_.SetQueue(queue_.num_waiting());
+  FinishIfDone();
+}
+
+void DispatcherStage::Watch() {
+  queue_.CheckExtractors(NowUs());
+  GiveWork();
+  context_.SetValue("extractors", queue_.num_extractors());
+  context_.SetValue("jobs_given_again", static_cast<double>(queue_.num_given_again()));
+  const bool stuck = queue_.num_extractors() == 0 && !queue_.idle();
+  if (stuck && !warned_no_extractor_) {
+    context_.ReportError("no extractor answers and frames are waiting: start one (tessera-extractor --id 0)");
+  }
+  warned_no_extractor_ = stuck;
+}
+
+void DispatcherStage::FinishIfDone() {
+  if (context_.finished() || !source_end_ || !queue_.idle()) {
+    return;
+  }
+  const bool all_came = newest_.value + 1 >= source_end_->num_frames;
+  if (!all_came && NowUs() - last_activity_us_ < kLastFrameTimeoutUs) {
+    return;
+  }
+  const int64_t num_missing = std::max<int64_t>(0, source_end_->num_frames - (newest_.value + 1));
+  context_.AddDropped(num_missing);
+  end_of_stream_.Publish({.stage = "dispatcher",
+                          .num_frames = queue_.last_frame().value + 1,
+                          .num_dropped = source_end_->num_dropped + num_dropped_ + num_missing});
+  context_.Finish();
+}
+
+}  // namespace tessera

@@ -1,0 +1,40 @@
+// Puts the candidates of each frame together again and releases frames in their order.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <utility>
+
+#include "features/feature_types.h"
+
+namespace tessera {
+
+class FrameAssembler {
+ public:
+  // At most `max_open_frames` frames are kept waiting for tiles.
+  explicit FrameAssembler(int max_open_frames) : max_open_frames_(max_open_frames) {}
+
+  enum class Result {
+    kKept,      // new
+    kRepeated,  // was there already, or its frame is released: nothing to do
+    kRefused,   // contradicts the tiles of its frame that are there, or too many frames are open
+  };
+  Result Add(TileFeatures tile);
+
+  // Whether all tiles of the next frame in order are there.
+  bool CanRelease() const;
+  // The features of that frame; needs CanRelease().
+  FeatureFrame ReleaseNext();
+
+  int num_open_frames() const;
+  // The last frame released; invalid if none was.
+  FrameId last_released() const { return last_released_; }
+
+ private:
+  const int max_open_frames_;
+  std::map<std::pair<FrameId, int32_t>, TileFeatures> blocks_;  // ordered by (frame, tile)
+  std::map<FrameId, int32_t> num_blocks_;                       // by open frame
+  FrameId last_released_;
+};
+
+}  // namespace tessera

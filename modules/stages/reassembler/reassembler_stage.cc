@@ -1,0 +1,69 @@
+#include "stages/reassembler/reassembler_stage.h"
+
+#include "core/errors.h"
+#include "features/selection.h"
+
+namespace tessera {
+namespace {
+
+int MaxOpenFrames(const Settings& settings) {
+  const int max_open_frames = settings.Get<int>("reassembler.max_open_frames");
+  if (max_open_frames < 1) {
+    throw InputError("reassembler.max_open_frames must be at least 1");
+  }
+  return max_open_frames;
+}
+
+}  // namespace
+
+ReassemblerStage::ReassemblerStage(StageContext& context)
+    : context_(context), assembler_(MaxOpenFrames(context.settings())) {
+  features_ = context.Advertise<FeatureFrame>(kFeaturesChannel);
+  acks_ = context.Advertise<TileAck>(kTileAckChannel);
+  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  context.Subscribe<TileFeatures>(kTileFeaturesChannel,
+                                  [this](const TileFeatures& tile, const MessageInfo&) { OnTile(tile); });
+  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
+    if (end.stage == "dispatcher") {
+      dispatcher_end_ = end;
+      FinishIfDone();
+    }
+  });
+}
+
+void ReassemblerStage::OnTile(const TileFeatures& tile) {
+  if (const std::string problem = CheckTileFeatures(tile); !problem.empty()) {
+    context_.ReportError("candidates of frame " + std::to_string(tile.frame.value) + ", tile " +
+                         std::to_string(tile.tile) + " are refused: " + problem);
+    return;
+  }
+  if (assembler_.Add(tile) == FrameAssembler::Result::kRefused) {
+    context_.ReportError("tile " + std::to_string(tile.tile) + " of frame " + std::to_string(tile.frame.value) +
+                         " contradicts the tiles that came before it, or too many frames are open: it is refused");
+    return;
+  }
+  // Acknowledged also when repeated: the first acknowledgement may be what was late.
+  acks_.Publish({.frame = tile.frame, .tiles = {tile.tile}});
+  while (assembler_.CanRelease()) {
+    FeatureFrame frame;
+    {
+      const StepTimer timer(context_);
+      frame = assembler_.ReleaseNext();
+    }
+    features_.Publish(frame);
+  }
+  context_.SetQueue(assembler_.num_open_frames());
+  FinishIfDone();
+}
+
+void ReassemblerStage::FinishIfDone() {
+  if (context_.finished() || !dispatcher_end_ || assembler_.last_released().value + 1 < dispatcher_end_->num_frames) {
+    return;
+  }
+  end_of_stream_.Publish({.stage = "reassembler",
+                          .num_frames = dispatcher_end_->num_frames,
+                          .num_dropped = dispatcher_end_->num_dropped});
+  context_.Finish();
+}
+
+}  // namespace tessera

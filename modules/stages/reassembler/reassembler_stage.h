@@ -1,0 +1,28 @@
+// Wiring of the reassembler: candidates of tiles in, features of whole frames out.
+#pragma once
+
+#include <optional>
+
+#include "geometry/camera_frame.h"
+#include "stages/reassembler/frame_assembler.h"
+#include "transport/stage.h"
+
+namespace tessera {
+
+class ReassemblerStage {
+ public:
+  explicit ReassemblerStage(StageContext& context);
+
+ private:
+  void OnTile(const TileFeatures& tile);
+  void FinishIfDone();
+
+  StageContext& context_;
+  FrameAssembler assembler_;
+  Publisher<FeatureFrame> features_;
+  Publisher<TileAck> acks_;
+  Publisher<EndOfStream> end_of_stream_;
+  std::optional<EndOfStream> dispatcher_end_;
+};
+
+}  // namespace tessera
