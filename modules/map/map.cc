@@ -1,0 +1,253 @@
+#include "map/map.h"
+
+#include <algorithm>
+#include <bit>
+#include <initializer_list>
+
+#include "core/sha256.h"
+
+namespace tessera {
+namespace {
+
+// The hash of a map is the sum (modulo 2^64) of the hashes of its facts, so that it follows each change at once and does
+// not depend on the order of changes. A fact's hash mixes its words by the finaliser of SplitMix64 (Steele et al. 2014).
+class FactHash {
+ public:
+  explicit FactHash(uint64_t kind) : state_(kind) {}
+  FactHash& Add(uint64_t word) {
+    state_ += 0x9e3779b97f4a7c15ULL + word;
+    state_ = (state_ ^ (state_ >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    state_ = (state_ ^ (state_ >> 27)) * 0x94d049bb133111ebULL;
+    state_ ^= state_ >> 31;
+    return *this;
+  }
+  FactHash& Add(int64_t value) { return Add(static_cast<uint64_t>(value)); }
+  FactHash& Add(double value) { return Add(std::bit_cast<uint64_t>(value)); }
+  FactHash& Add(const Eigen::Vector3d& v) { return Add(v.x()).Add(v.y()).Add(v.z()); }
+  uint64_t value() const { return state_; }
+
+ private:
+  uint64_t state_;
+};
+
+uint64_t HashOf(KeyframeId id, const Keyframe& keyframe) {
+  const Eigen::Quaterniond& q = keyframe.world_from_camera.rotation;
+  return FactHash(1)
+      .Add(id.value)
+      .Add(keyframe.parent.value)
+      .Add(keyframe.features->frame.value)
+      .Add(static_cast<int64_t>(keyframe.features->keypoints.size()))
+      .Add(q.w())
+      .Add(q.x())
+      .Add(q.y())
+      .Add(q.z())
+      .Add(keyframe.world_from_camera.translation)
+      .value();
+}
+
+uint64_t HashOf(LandmarkId id, const Landmark& landmark) {
+  FactHash hash(2);
+  hash.Add(id.value).Add(landmark.position_in_world).Add(landmark.normal);
+  hash.Add(landmark.min_distance).Add(landmark.max_distance);
+  for (const uint64_t word : landmark.descriptor) hash.Add(word);
+  return hash.value();
+}
+
+uint64_t HashOf(const MapDelta::ChangedObservation& fact) {
+  return FactHash(3)
+      .Add(fact.landmark.value)
+      .Add(fact.observation.keyframe.value)
+      .Add(int64_t{fact.observation.keypoint})
+      .value();
+}
+
+std::string Name(KeyframeId id) { return "keyframe " + std::to_string(id.value); }
+std::string Name(LandmarkId id) { return "landmark " + std::to_string(id.value); }
+
+}  // namespace
+
+std::string Map::Apply(const MapDelta& delta) {
+  if (delta.is_snapshot) {
+    *this = Map();
+    next_delta_ = delta.number;
+  }
+  if (delta.number != next_delta_) {
+    return "delta " + std::to_string(delta.number) + " came where " + std::to_string(next_delta_) + " was expected";
+  }
+  if (std::string problem = ApplyLists(delta); !problem.empty()) {
+    return "delta " + std::to_string(delta.number) + ": " + problem;
+  }
+  ++next_delta_;
+  if (hash_ != delta.hash) {
+    return "delta " + std::to_string(delta.number) + ": this replica of the map differs from the mapper's (wrong hash)";
+  }
+  return "";
+}
+
+std::string Map::ApplyLists(const MapDelta& delta) {
+  for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
+    if (!added.id.valid() || keyframes_.Has(added.id) || added.features == nullptr) {
+      return Name(added.id) + " can't be added";
+    }
+    const size_t num_keypoints = added.features->keypoints.size();
+    const Keyframe& keyframe = keyframes_.Put(
+        added.id, {added.features, added.world_from_camera, added.parent, std::vector<LandmarkId>(num_keypoints), {}});
+    hash_ += HashOf(added.id, keyframe);
+  }
+  for (const MapDelta::MovedKeyframe& moved : delta.moved_keyframes) {
+    Keyframe* keyframe = keyframes_.Find(moved.id);
+    if (keyframe == nullptr) return Name(moved.id) + " is not there to be moved";
+    hash_ -= HashOf(moved.id, *keyframe);
+    keyframe->world_from_camera = moved.world_from_camera;
+    hash_ += HashOf(moved.id, *keyframe);
+  }
+  for (const auto& [id, landmark] : delta.changed_landmarks) {
+    if (!id.valid()) return "a landmark without an id";
+    if (Landmark* old = landmarks_.Find(id); old != nullptr) {
+      hash_ -= HashOf(id, *old);
+      *old = landmark;
+    } else {
+      landmarks_.Put(id, landmark);
+      observations_.Put(id, {});
+    }
+    hash_ += HashOf(id, landmark);
+  }
+  for (const auto& change : delta.removed_observations) {
+    if (std::string problem = RemoveObservation(change); !problem.empty()) return problem;
+  }
+  for (const auto& change : delta.new_observations) {
+    if (std::string problem = AddObservation(change); !problem.empty()) return problem;
+  }
+  for (const auto& [id, parent] : delta.changed_parents) {
+    Keyframe* keyframe = keyframes_.Find(id);
+    if (keyframe == nullptr) return Name(id) + " is not there to get another parent";
+    hash_ -= HashOf(id, *keyframe);
+    keyframe->parent = parent;
+    hash_ += HashOf(id, *keyframe);
+  }
+  for (const LandmarkId id : delta.removed_landmarks) {
+    if (!landmarks_.Has(id) || !observations_.Find(id)->empty()) return Name(id) + " can't be removed";
+    hash_ -= HashOf(id, *landmarks_.Find(id));
+    landmarks_.Remove(id);
+    observations_.Remove(id);
+  }
+  for (const KeyframeId id : delta.removed_keyframes) {
+    const Keyframe* keyframe = keyframes_.Find(id);
+    if (keyframe == nullptr || std::any_of(keyframe->landmarks.begin(), keyframe->landmarks.end(),
+                                           [](LandmarkId landmark) { return landmark.valid(); })) {
+      return Name(id) + " can't be removed";
+    }
+    hash_ -= HashOf(id, *keyframe);
+    keyframes_.Remove(id);
+  }
+  return "";
+}
+
+std::string Map::AddObservation(const MapDelta::ChangedObservation& change) {
+  const auto& [landmark, observation] = change;
+  Keyframe* keyframe = keyframes_.Find(observation.keyframe);
+  std::vector<Observation>* observations = observations_.Find(landmark);
+  if (keyframe == nullptr || observations == nullptr || observation.keypoint < 0 ||
+      static_cast<size_t>(observation.keypoint) >= keyframe->landmarks.size() ||
+      keyframe->landmarks[static_cast<size_t>(observation.keypoint)].valid()) {
+    return Name(observation.keyframe) + " can't observe " + Name(landmark);
+  }
+  const auto place = std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
+  if (place != observations->end() && place->keyframe == observation.keyframe) {
+    return Name(observation.keyframe) + " can't observe " + Name(landmark) + " twice";
+  }
+  for (const Observation& other : *observations) {
+    CountShared(observation.keyframe, other.keyframe, 1);
+  }
+  observations->insert(place, observation);
+  keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = landmark;
+  hash_ += HashOf(change);
+  return "";
+}
+
+std::string Map::RemoveObservation(const MapDelta::ChangedObservation& change) {
+  const auto& [landmark, observation] = change;
+  Keyframe* keyframe = keyframes_.Find(observation.keyframe);
+  std::vector<Observation>* observations = observations_.Find(landmark);
+  if (keyframe == nullptr || observations == nullptr || std::erase(*observations, observation) == 0) {
+    return Name(observation.keyframe) + " does not observe " + Name(landmark);
+  }
+  for (const Observation& other : *observations) {
+    CountShared(observation.keyframe, other.keyframe, -1);
+  }
+  keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = LandmarkId{};
+  hash_ -= HashOf(change);
+  return "";
+}
+
+void Map::CountShared(KeyframeId a, KeyframeId b, int change) {
+  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
+    auto& covisible = keyframes_.Find(from)->covisible;
+    if ((covisible[to] += change) == 0) {
+      covisible.erase(to);
+    }
+  }
+}
+
+const std::vector<Observation>& Map::ObservationsOf(LandmarkId id) const {
+  static const std::vector<Observation> kNone;
+  const std::vector<Observation>* observations = observations_.Find(id);
+  return observations == nullptr ? kNone : *observations;
+}
+
+std::vector<KeyframeId> Map::Covisible(KeyframeId id, int max_num, int min_shared) const {
+  std::vector<std::pair<int32_t, KeyframeId>> ranked;
+  if (const Keyframe* keyframe = keyframes_.Find(id); keyframe != nullptr) {
+    for (const auto& [other, num_shared] : keyframe->covisible) {
+      if (num_shared >= min_shared) ranked.emplace_back(-num_shared, other);
+    }
+  }
+  std::sort(ranked.begin(), ranked.end());
+  std::vector<KeyframeId> ids;
+  for (size_t i = 0; i < ranked.size() && i < static_cast<size_t>(max_num); ++i) {
+    ids.push_back(ranked[i].second);
+  }
+  return ids;
+}
+
+MapDelta Map::Snapshot() const {
+  MapDelta delta;
+  delta.number = next_delta_ == 0 ? 0 : next_delta_ - 1;
+  delta.is_snapshot = true;
+  delta.hash = hash_;
+  keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
+    delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features});
+  });
+  landmarks_.ForEach([&](LandmarkId id, const Landmark& landmark) {
+    delta.changed_landmarks.push_back({id, landmark});
+    for (const Observation& observation : *observations_.Find(id)) {
+      delta.new_observations.push_back({id, observation});
+    }
+  });
+  return delta;
+}
+
+std::string Map::Sha256Hex() const {
+  Sha256 sha;
+  keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
+    sha.Add(id.value);
+    sha.Add(keyframe.features->frame.value);
+    sha.Add(keyframe.parent.value);
+    const Eigen::Quaterniond& q = keyframe.world_from_camera.rotation;
+    const Eigen::Vector3d& t = keyframe.world_from_camera.translation;
+    for (const double number : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) sha.Add(number);
+    for (const LandmarkId landmark : keyframe.landmarks) sha.Add(landmark.value);
+  });
+  landmarks_.ForEach([&](LandmarkId id, const Landmark& landmark) {
+    sha.Add(id.value);
+    for (const Eigen::Vector3d& v : {landmark.position_in_world, landmark.normal}) {
+      for (const double number : {v.x(), v.y(), v.z()}) sha.Add(number);
+    }
+    sha.Add(landmark.min_distance);
+    sha.Add(landmark.max_distance);
+    for (const uint64_t word : landmark.descriptor) sha.Add(static_cast<int64_t>(word));
+  });
+  return sha.HexDigest();
+}
+
+}  // namespace tessera

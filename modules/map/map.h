@@ -1,0 +1,126 @@
+// The map: keyframes, landmarks, and which keyframe saw which landmark where.
+//
+// The mapper alone decides on changes. It writes them down as numbered deltas, and everybody, the mapper included, holds
+// a map that changes by Apply(delta) and by nothing else. So all replicas are equal, and the hash that each delta carries
+// shows at once if one is not. A snapshot is a delta that starts from the empty map.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/id_map.h"
+#include "core/ids.h"
+#include "features/feature_types.h"
+#include "geometry/rigid3.h"
+
+namespace tessera {
+
+// Where a keyframe saw a landmark.
+struct Observation {
+  KeyframeId keyframe;
+  int32_t keypoint = -1;  // index into the keyframe's features
+  auto operator<=>(const Observation&) const = default;
+};
+
+// A landmark (map point) as the mapper estimated it.
+struct Landmark {
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // metres (mono: units of the map)
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // mean unit direction from the landmark to the cameras that saw it
+  double min_distance = 0.0;  // between these distances from a camera its scale fits the pyramid
+  double max_distance = 0.0;
+  Descriptor descriptor{};  // the observation's that is nearest to all others
+  bool operator==(const Landmark&) const = default;
+};
+
+// A keyframe in the map: its features never change, its pose does.
+struct Keyframe {
+  std::shared_ptr<const FeatureFrame> features;
+  Rigid3 world_from_camera;
+  KeyframeId parent;  // spanning tree: the older keyframe that shared most landmarks at birth; invalid: the root
+  std::vector<LandmarkId> landmarks;         // by keypoint; invalid: none
+  std::map<KeyframeId, int32_t> covisible;   // keyframes that share landmarks, and how many
+};
+
+// One numbered change of the map. The lists are applied in the order in which they stand here.
+struct MapDelta {
+  struct NewKeyframe {
+    KeyframeId id;
+    KeyframeId parent;
+    Rigid3 world_from_camera;
+    std::shared_ptr<const FeatureFrame> features;
+  };
+  struct MovedKeyframe {
+    KeyframeId id;
+    Rigid3 world_from_camera;
+  };
+  struct ChangedLandmark {
+    LandmarkId id;
+    Landmark landmark;
+  };
+  struct ChangedObservation {
+    LandmarkId landmark;
+    Observation observation;
+    bool operator==(const ChangedObservation&) const = default;
+  };
+  struct ChangedParent {
+    KeyframeId id;
+    KeyframeId parent;
+  };
+
+  int64_t number = 0;         // counts from 0; a replica applies them in order
+  KeyframeId answers;         // the keyframe whose processing made this delta; its place in logical time
+  bool is_snapshot = false;   // starts from the empty map, whatever the replica held
+  std::vector<NewKeyframe> new_keyframes;
+  std::vector<MovedKeyframe> moved_keyframes;
+  std::vector<ChangedLandmark> changed_landmarks;  // new ones too
+  std::vector<ChangedObservation> removed_observations;
+  std::vector<ChangedObservation> new_observations;
+  std::vector<ChangedParent> changed_parents;
+  std::vector<LandmarkId> removed_landmarks;  // must have no observations left
+  std::vector<KeyframeId> removed_keyframes;  // likewise
+  uint64_t hash = 0;                          // of the map after this delta
+};
+
+class Map {
+ public:
+  // Why a delta could not be applied; empty if it was. The map is unusable after a failure (ask for a snapshot).
+  [[nodiscard]] std::string Apply(const MapDelta& delta);
+
+  // Number that the next delta must have.
+  int64_t next_delta() const { return next_delta_; }
+  // Depends on the exact content alone, not on the way that led to it; kept up to date by each change.
+  uint64_t hash() const { return hash_; }
+
+  const Keyframe* FindKeyframe(KeyframeId id) const { return keyframes_.Find(id); }
+  const Landmark* FindLandmark(LandmarkId id) const { return landmarks_.Find(id); }
+  // Sorted by keyframe; empty if there is no such landmark.
+  const std::vector<Observation>& ObservationsOf(LandmarkId id) const;
+  const IdMap<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
+  const IdMap<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
+
+  // Keyframes that share at least `min_shared` landmarks with `id`, most first, ties by lower id, at most `max_num`.
+  std::vector<KeyframeId> Covisible(KeyframeId id, int max_num, int min_shared = 1) const;
+
+  // The whole map as a delta.
+  MapDelta Snapshot() const;
+  // SHA-256 of the exact content: `map_sha256`.
+  std::string Sha256Hex() const;
+
+ private:
+  [[nodiscard]] std::string ApplyLists(const MapDelta& delta);
+  [[nodiscard]] std::string AddObservation(const MapDelta::ChangedObservation& change);
+  [[nodiscard]] std::string RemoveObservation(const MapDelta::ChangedObservation& change);
+  void CountShared(KeyframeId a, KeyframeId b, int change);
+
+  IdMap<KeyframeId, Keyframe> keyframes_;
+  IdMap<LandmarkId, Landmark> landmarks_;
+  IdMap<LandmarkId, std::vector<Observation>> observations_;
+  int64_t next_delta_ = 0;
+  uint64_t hash_ = 0;
+};
+
+}  // namespace tessera
