@@ -111,6 +111,8 @@ class Map {
   std::string Sha256Hex() const;
 
  private:
+  friend class MapEditor;  // the owner applies its edits one by one, and counts them as one delta
+
   [[nodiscard]] std::string ApplyLists(const MapDelta& delta);
   [[nodiscard]] std::string AddObservation(const MapDelta::ChangedObservation& change);
   [[nodiscard]] std::string RemoveObservation(const MapDelta::ChangedObservation& change);

@@ -1,0 +1,58 @@
+// The owner's way to change its map: each edit is applied at once, and all of them together become one delta with
+// nothing in it that a later edit took back.
+//
+// Every edit goes through the function that applies deltas, so the owner's map changes in the way of all replicas.
+#pragma once
+
+#include <map>
+#include <set>
+#include <utility>
+
+#include "map/map.h"
+
+namespace tessera {
+
+class MapEditor {
+ public:
+  // `map` must outlive the editor and be changed by nobody else meanwhile.
+  explicit MapEditor(Map& map) : map_(map), number_(map.next_delta()) {}
+
+  const Map& map() const { return map_; }
+
+  void AddKeyframe(KeyframeId id, KeyframeId parent, const Rigid3& world_from_camera,
+                   std::shared_ptr<const FeatureFrame> features);
+  void MoveKeyframe(KeyframeId id, const Rigid3& world_from_camera);
+  void SetParent(KeyframeId id, KeyframeId parent);
+  // Its observations go with it. Its children must have another parent by the time of Finish().
+  void RemoveKeyframe(KeyframeId id);
+
+  // A landmark that did not exist before, with the next free id.
+  LandmarkId AddLandmark(const Landmark& landmark);
+  void ChangeLandmark(LandmarkId id, const Landmark& landmark);
+  // Its observations go with it.
+  void RemoveLandmark(LandmarkId id);
+  // `kept` gets the observations of `removed`, but for keyframes and keypoints where it has one already.
+  void MergeLandmarks(LandmarkId removed, LandmarkId kept);
+
+  // The keyframe must not see the landmark yet, nor the keypoint another one.
+  void AddObservation(LandmarkId landmark, const Observation& observation);
+  void RemoveObservation(LandmarkId landmark, const Observation& observation);
+
+  // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
+  const std::set<LandmarkId>& touched_landmarks() const { return touched_; }
+
+  // The delta of all edits. The editor must not be used after it.
+  MapDelta Finish(KeyframeId answers);
+
+ private:
+  void Apply(MapDelta&& part);
+
+  Map& map_;
+  const int64_t number_;
+  std::map<KeyframeId, MapDelta::NewKeyframe> new_keyframes_;
+  std::set<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
+  std::set<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_;
+  std::map<std::pair<LandmarkId, Observation>, int> observations_;  // +1: new, -1: removed, 0: taken back
+};
+
+}  // namespace tessera
