@@ -1,0 +1,66 @@
+#include "map/landmark_description.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace tessera {
+namespace {
+
+constexpr double kLevelScale = 1.2;
+
+size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
+
+Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in_world,
+                              const std::vector<Observation>& observations) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Observation& observation : observations) {
+    const Eigen::Vector3d& camera_in_world = map.FindKeyframe(observation.keyframe)->world_from_camera.translation;
+    sum += (camera_in_world - position_in_world).normalized();
+  }
+  return sum.normalized();
+}
+
+Descriptor Medoid(const std::vector<Descriptor>& descriptors) {
+  size_t best = 0;
+  int best_median = 257;
+  std::vector<int> distances(descriptors.size());
+  for (size_t i = 0; i < descriptors.size(); ++i) {
+    for (size_t j = 0; j < descriptors.size(); ++j) {
+      distances[j] = HammingDistance(descriptors[i], descriptors[j]);
+    }
+    const auto middle = distances.begin() + static_cast<ptrdiff_t>((distances.size() - 1) / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    if (*middle < best_median) {
+      best_median = *middle;
+      best = i;
+    }
+  }
+  return descriptors[best];
+}
+
+}  // namespace
+
+Landmark DescribeLandmark(const Map& map, LandmarkId id) {
+  Landmark landmark = *map.FindLandmark(id);
+  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  landmark.normal = MeanDirection(map, landmark.position_in_world, observations);
+
+  const Keyframe& newest = *map.FindKeyframe(observations.back().keyframe);
+  const Keypoint& keypoint = newest.features->keypoints[Index(observations.back().keypoint)];
+  const double distance = (newest.world_from_camera.translation - landmark.position_in_world).norm();
+  constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;
+  landmark.max_distance = distance * std::pow(kLevelScale, keypoint.level);
+  landmark.min_distance = landmark.max_distance / std::pow(kLevelScale, kTopLevel);
+
+  std::vector<Descriptor> descriptors;
+  const size_t first = observations.size() > kMaxDescriptors ? observations.size() - kMaxDescriptors : 0;
+  for (size_t i = first; i < observations.size(); ++i) {
+    const FeatureFrame& features = *map.FindKeyframe(observations[i].keyframe)->features;
+    descriptors.push_back(features.descriptors[Index(observations[i].keypoint)]);
+  }
+  landmark.descriptor = Medoid(descriptors);
+  return landmark;
+}
+
+}  // namespace tessera

@@ -1,0 +1,21 @@
+// What follows from a landmark's position and observations, and helps to find it again.
+#pragma once
+
+#include "map/map.h"
+
+namespace tessera {
+
+// The landmark with normal, distance range and descriptor computed anew from its present observations (at least one):
+//
+//   normal = normalised mean over observations of (camera_in_world - position) / |camera_in_world - position|
+//   max_distance = d * 1.2^level,  min_distance = max_distance / 1.2^(num_levels - 1)
+//
+// with d and level from the newest keyframe that saw it: closer than min_distance or farther than max_distance its
+// patch would fall off the pyramid. The descriptor is the observation's with the least median distance to the others
+// (the medoid, as in ORB-SLAM: Mur-Artal et al. 2015); ties go to the older keyframe. To bound the work, at most the
+// newest kMaxDescriptors observations count for it.
+Landmark DescribeLandmark(const Map& map, LandmarkId id);
+
+inline constexpr int kMaxDescriptors = 12;
+
+}  // namespace tessera
