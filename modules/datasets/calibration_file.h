@@ -1,0 +1,25 @@
+// Calibration files of one's own cameras (`--camera FILE.yaml`). config/cameras/example.yaml is a commented one.
+//
+//   width_px: 752                  # image size; may be left out, then the first image decides
+//   height_px: 480
+//   fx_px: 458.654                 # pinhole
+//   fy_px: 457.296
+//   cx_px: 367.215
+//   cy_px: 248.375
+//   distortion: [k1, k2, p1, p2]   # radial-tangential (camera_rig.h); 4, 5 or 8 numbers; may be left out
+//   depth_unit_m: 0.001            # RGB-D: metres per count of the depth image
+//   baseline_m: 0.54               # stereo, images rectified already: distance of the cameras; or, if they aren't:
+//   right:                         # the right camera: fx_px, fy_px, cx_px, cy_px, distortion, and
+//     right_from_left: [...]       #   12 numbers, [R | t] row by row, t in metres: x_right = R x_left + t
+#pragma once
+
+#include <string>
+
+#include "datasets/camera_rig.h"
+
+namespace tessera {
+
+// Reads such a file. Throws InputError with file and key if a key is unknown, missing or out of range.
+CameraRig LoadCalibrationFile(const std::string& path);
+
+}  // namespace tessera

@@ -1,0 +1,197 @@
+// EuRoC MAV sequences: mav0/cam0 and cam1 (sensor.yaml, data.csv, data/), and the pose of the body (IMU) in
+// mav0/state_groundtruth_estimate0/data.csv. T_BS of a sensor.yaml is body_from_sensor.
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+#include <map>
+
+#include "core/errors.h"
+#include "datasets/calibration_file.h"
+#include "datasets/image_file.h"
+#include "datasets/pose_track.h"
+#include "datasets/recording.h"
+#include "datasets/text_file.h"
+
+namespace tessera {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Sensor {
+  PinholeCamera camera;
+  Rigid3 body_from_sensor;
+};
+
+std::vector<double> Numbers(const YAML::Node& node, const std::string& key, const std::string& path) {
+  try {
+    return node.as<std::vector<double>>();
+  } catch (const YAML::Exception&) {
+    throw InputError("file " + path + ": `" + key + "` is missing or not a list of numbers: repair the file");
+  }
+}
+
+Rigid3 ReadBodyFromSensor(const YAML::Node& document, const std::string& path) {
+  const YAML::Node node = document["T_BS"];
+  const std::vector<double> m = Numbers(node && node.IsMap() ? node["data"] : YAML::Node(), "T_BS", path);
+  if (m.size() != 16) {
+    throw InputError("file " + path + ": `T_BS` must have 16 numbers, not " + std::to_string(m.size()));
+  }
+  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(m.data());
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  if ((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-2 || rotation.determinant() < 0.0) {
+    throw InputError("file " + path + ": `T_BS` does not begin with a rotation: repair the file");
+  }
+  return Rigid3::FromMatrix(rotation, matrix.topRightCorner<3, 1>());
+}
+
+Sensor ParseSensorFile(const YAML::Node& document, const std::string& path) {
+  const auto model = document["camera_model"].as<std::string>("pinhole");
+  const auto distortion = document["distortion_model"].as<std::string>("radial-tangential");
+  if (model != "pinhole" || (distortion != "radial-tangential" && distortion != "radtan")) {
+    throw InputError("file " + path + ": camera model " + model + " with " + distortion +
+                     " distortion is not supported: only pinhole with radial-tangential is");
+  }
+  const std::vector<double> intrinsics = Numbers(document["intrinsics"], "intrinsics", path);
+  const std::vector<double> resolution = Numbers(document["resolution"], "resolution", path);
+  if (intrinsics.size() != 4 || resolution.size() != 2) {
+    throw InputError("file " + path + ": `intrinsics` must have 4 numbers and `resolution` 2: repair the file");
+  }
+  Sensor sensor;
+  sensor.camera.width_px = static_cast<int>(resolution[0]);
+  sensor.camera.height_px = static_cast<int>(resolution[1]);
+  sensor.camera.fx_px = intrinsics[0];
+  sensor.camera.fy_px = intrinsics[1];
+  sensor.camera.cx_px = intrinsics[2];
+  sensor.camera.cy_px = intrinsics[3];
+  sensor.camera.distortion = Numbers(document["distortion_coefficients"], "distortion_coefficients", path);
+  if (const std::string problem = sensor.camera.Check(); !problem.empty()) {
+    throw InputError("file " + path + ": " + problem);
+  }
+  sensor.body_from_sensor = ReadBodyFromSensor(document, path);
+  return sensor;
+}
+
+Sensor ReadSensor(const fs::path& path) {
+  try {
+    const YAML::Node document = YAML::Load(ReadFile(path));
+    if (!document.IsMap()) {
+      throw InputError("file " + path.string() + " must hold `key: value` lines: copy it again");
+    }
+    return ParseSensorFile(document, path);
+  } catch (const YAML::Exception& error) {
+    throw InputError("file " + path.string() + " can't be understood: " + error.what());
+  }
+}
+
+// Image files of a camera by time, nanoseconds. Throws InputError if one does not exist.
+std::map<int64_t, std::string> ReadImageTable(const fs::path& camera_folder) {
+  std::map<int64_t, std::string> images;
+  for (const TextRow& row : ReadRows(camera_folder / "data.csv")) {
+    const int64_t time_ns = row.Integer(0);
+    const std::string name = row.fields.size() > 1 ? row.fields[1] : row.fields[0] + ".png";
+    const std::string path = FindImage(camera_folder / "data" / name);
+    if (path.empty()) {
+      throw InputError(row.place + " names " + (camera_folder / "data" / name).string() +
+                       ", which does not exist: copy the sequence again");
+    }
+    images.emplace(time_ns, path);
+  }
+  return images;
+}
+
+// Rows: time [ns], position x y z [m], rotation w x y z; velocities and biases may follow.
+PoseTrack ReadBodyTrack(const fs::path& path) {
+  PoseTrack world_from_body;
+  for (const TextRow& row : ReadRows(path)) {
+    const Eigen::Quaterniond rotation(row.Number(4), row.Number(5), row.Number(6), row.Number(7));
+    if (std::abs(rotation.norm() - 1.0) > 0.1) {
+      throw InputError(row.place + ": fields 5 to 8 are not a unit quaternion w x y z: repair the file");
+    }
+    world_from_body.Add(row.Integer(0),
+                        {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});
+  }
+  return world_from_body;
+}
+
+// Images that both cameras took at the same moment; all of the left one's for mono.
+std::vector<int64_t> OpenImages(const fs::path& mav, SensorType sensor, Recording& recording) {
+  const std::map<int64_t, std::string> left = ReadImageTable(mav / "cam0");
+  const bool is_stereo = sensor == SensorType::kStereo;
+  const std::map<int64_t, std::string> right =
+      is_stereo ? ReadImageTable(mav / "cam1") : std::map<int64_t, std::string>();
+  std::vector<int64_t> times_ns;
+  std::vector<std::string> left_paths, right_paths;
+  for (const auto& [time_ns, path] : left) {
+    const auto match = right.find(time_ns);
+    if (is_stereo && match == right.end()) {
+      continue;
+    }
+    times_ns.push_back(time_ns);
+    recording.utimes_us.push_back(time_ns / 1000);
+    left_paths.push_back(path);
+    if (is_stereo) {
+      right_paths.push_back(match->second);
+    }
+  }
+  if (times_ns.empty()) {
+    throw InputError("folder " + mav.string() + ": no image of cam0 has the time of one of cam1: use --sensor mono");
+  }
+  const size_t num_single = left.size() + right.size() - left_paths.size() - right_paths.size();
+  if (num_single > 0) {
+    recording.notes.push_back(std::to_string(num_single) + " images without a partner in the other camera are skipped.");
+  }
+  recording.left = ReadImageFiles(std::move(left_paths));
+  recording.right = is_stereo ? ReadImageFiles(std::move(right_paths)) : nullptr;
+  return times_ns;
+}
+
+// world_from_left = world_from_body * body_from_left
+void ReadGroundTruth(const fs::path& path, const Rigid3& body_from_left, const std::vector<int64_t>& times_ns,
+                     Recording& recording) {
+  if (!fs::exists(path)) {
+    recording.notes.push_back("No ground truth: " + path.string() + " does not exist.");
+    return;
+  }
+  const PoseTrack world_from_body = ReadBodyTrack(path);
+  for (size_t i = 0; i < times_ns.size(); ++i) {
+    if (const auto pose = world_from_body.At(times_ns[i])) {
+      recording.ground_truth.push_back(
+          {FrameId{static_cast<int64_t>(i)}, recording.utimes_us[i], *pose * body_from_left});
+    }
+  }
+}
+
+}  // namespace
+
+Recording LoadEuroc(const std::string& folder, const SourceOptions& options) {
+  RequireFolder(folder);
+  if (options.sensor == SensorType::kRgbd) {
+    throw InputError("EuRoC sequence " + folder + " has no depth images: use --sensor mono or stereo");
+  }
+  const fs::path mav = fs::is_directory(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  if (!fs::is_directory(mav / "cam0")) {
+    throw InputError("folder " + folder + " does not hold mav0/cam0: give the folder of a EuRoC sequence, such as .../MH_01");
+  }
+  const bool is_stereo = options.sensor == SensorType::kStereo;
+  if (is_stereo && !fs::is_directory(mav / "cam1")) {
+    throw InputError("folder " + mav.string() + " has no cam1, which stereo needs: use --sensor mono");
+  }
+  Recording recording;
+  recording.times_path = mav / "cam0" / "data.csv";
+  const Sensor left = ReadSensor(mav / "cam0" / "sensor.yaml");
+  if (!options.calibration_path.empty()) {
+    recording.rig = LoadCalibrationFile(options.calibration_path);
+  } else {
+    recording.rig.left = left.camera;
+    if (is_stereo) {
+      const Sensor right = ReadSensor(mav / "cam1" / "sensor.yaml");
+      recording.rig.right = right.camera;
+      recording.rig.right_from_left = right.body_from_sensor.Inverse() * left.body_from_sensor;
+    }
+  }
+  const std::vector<int64_t> times_ns = OpenImages(mav, options.sensor, recording);
+  ReadGroundTruth(mav / "state_groundtruth_estimate0" / "data.csv", left.body_from_sensor, times_ns, recording);
+  return recording;
+}
+
+}  // namespace tessera

@@ -1,0 +1,51 @@
+// Where frames come from: folders of data sets, videos, cameras.
+//
+// A frame keeps the number that it has in its source, also when only some frames are asked for, so that frame 100 of
+// a sequence is frame 100 in every run, log and table. The first frame of a source is frame 0; for a stereo or RGB-D
+// source whose images are associated by time, pairs are counted.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/camera_frame.h"
+
+namespace tessera {
+
+struct SourceOptions {
+  std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://...
+  SensorType sensor = SensorType::kMono;  // mono takes the left images of a pair
+  std::string calibration_path;           // YAML (calibration_file.h), instead of the source's own; empty: its own
+  double depth_unit_m = 0.0;              // RGB-D: metres per count, instead of what the source says; 0: as it says
+  int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
+  int64_t last_frame = -1;                // -1: to the end
+};
+
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  // The camera of the frames: undistorted, rectified.
+  virtual const CameraCalibration& calibration() const = 0;
+  // How many frames Next() will yield in all; nullopt if the source can't know.
+  virtual std::optional<int64_t> num_frames() const = 0;
+  // Poses of the left rectified camera at those wanted frames of which the source knows it, by frame number.
+  virtual const std::vector<GroundTruthPose>& ground_truth() const = 0;
+  // The next frame; nullopt at the end. Throws InputError at an image that is damaged or of another size.
+  virtual std::optional<CameraFrame> Next() = 0;
+  // Whether frames come by themselves and can't be made to wait.
+  virtual bool is_live() const = 0;
+  // What the user should know of how the source was read, one sentence each.
+  virtual const std::vector<std::string>& notes() const = 0;
+};
+
+// "mono", "stereo" or "rgbd". Throws InputError.
+SensorType ParseSensor(const std::string& text);
+
+// Opens the source that the options name. Throws InputError with one sentence if it can't.
+std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options);
+
+}  // namespace tessera

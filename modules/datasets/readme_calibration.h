@@ -1,0 +1,19 @@
+// The calibration that the README of a data set tells people, for formats that have no place for one.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "datasets/camera_rig.h"
+
+namespace tessera {
+
+// The pinhole of a text such as `fx=fy=585 cx=320 cy = 240.5` (pixels): every key of a chain gets the number at its
+// end, and the first mention of a key counts. nullopt unless all four are there and make sense.
+std::optional<PinholeCamera> PinholeFromText(const std::string& text);
+
+// Metres per count of depth images, from `factor N` (counts per metre; the first mention) or else the word
+// millimetres. 0: the text doesn't say.
+double DepthUnitFromText(const std::string& text);
+
+}  // namespace tessera

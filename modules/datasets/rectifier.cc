@@ -1,0 +1,171 @@
+#include "datasets/rectifier.h"
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/errors.h"
+
+namespace tessera {
+namespace {
+
+cv::Mat CameraMatrix(const PinholeCamera& camera) {
+  return (cv::Mat_<double>(3, 3) << camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0);
+}
+
+Eigen::Matrix3d ToEigen(const cv::Mat& matrix) {
+  Eigen::Matrix3d result;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      result(row, column) = matrix.at<double>(row, column);
+    }
+  }
+  return result;
+}
+
+bool IsRectifiedPair(const CameraRig& rig) {
+  const PinholeCamera& left = rig.left;
+  const PinholeCamera& right = *rig.right;
+  const Rigid3& move = rig.right_from_left;
+  return left.distortion.empty() && right.distortion.empty() && left.fx_px == right.fx_px &&
+         left.fy_px == right.fy_px && left.cx_px == right.cx_px && left.cy_px == right.cy_px &&
+         move.rotation.coeffs() == Eigen::Quaterniond::Identity().coeffs() && move.translation.x() < 0.0 &&
+         move.translation.y() == 0.0 && move.translation.z() == 0.0;
+}
+
+// Whether each pixel of the new image comes from inside the original one.
+bool SeesOnlyImage(const PinholeCamera& camera, const cv::Mat& rotation, const cv::Mat& new_camera) {
+  cv::Mat x_px, y_px;
+  cv::initUndistortRectifyMap(CameraMatrix(camera), camera.distortion, rotation, new_camera,
+                              cv::Size(camera.width_px, camera.height_px), CV_32FC1, x_px, y_px);
+  return cv::checkRange(x_px, true, nullptr, 0.0, camera.width_px - 1 + 1e-3) &&
+         cv::checkRange(y_px, true, nullptr, 0.0, camera.height_px - 1 + 1e-3);
+}
+
+// OpenCV fits the new image into the original at a few points of its border only, so that up to two pixels beside them
+// stay black. This narrows the view until none is.
+constexpr double kZoomStep = 1.002;
+constexpr int kMaxZoomSteps = 200;
+
+void ZoomIn(cv::Mat& projection) {
+  projection.row(0).colRange(0, 2) *= kZoomStep;
+  projection.row(1).colRange(0, 2) *= kZoomStep;
+  if (projection.cols == 4) {
+    projection.at<double>(0, 3) *= kZoomStep;  // -f * baseline
+  }
+}
+
+// Where each pixel of the new image comes from, in OpenCV's fixed-point form (1/32 pixel).
+struct RemapTable {
+  cv::Mat whole;
+  cv::Mat fraction;
+
+  RemapTable() = default;
+  RemapTable(const PinholeCamera& camera, const cv::Mat& rotation, const cv::Mat& new_camera) {
+    cv::initUndistortRectifyMap(CameraMatrix(camera), camera.distortion, rotation, new_camera,
+                                cv::Size(camera.width_px, camera.height_px), CV_16SC2, whole, fraction);
+  }
+
+  template <class Pixel>
+  Image<Pixel> Apply(Image<Pixel>& image, int type, int interpolation) const {
+    Image<Pixel> result(image.width, image.height);
+    const cv::Mat from(image.height, image.width, type, image.pixels.data());
+    cv::Mat to(result.height, result.width, type, result.pixels.data());
+    cv::remap(from, to, whole, interpolation == cv::INTER_NEAREST ? cv::Mat() : fraction, interpolation,
+              cv::BORDER_CONSTANT);
+    return result;
+  }
+};
+
+}  // namespace
+
+struct Rectifier::Maps {
+  RemapTable left;
+  RemapTable right;
+  RemapTable nearest;  // as `left`, rounded to whole pixels
+};
+
+Rectifier::Rectifier(const CameraRig& rig, SensorType sensor) {
+  calibration_.sensor = sensor;
+  calibration_.width_px = rig.left.width_px;
+  calibration_.height_px = rig.left.height_px;
+  calibration_.fx_px = rig.left.fx_px;
+  calibration_.fy_px = rig.left.fy_px;
+  calibration_.cx_px = rig.left.cx_px;
+  calibration_.cy_px = rig.left.cy_px;
+  calibration_.depth_unit_m = sensor == SensorType::kRgbd ? rig.depth_unit_m : 0.0;
+  if (sensor == SensorType::kStereo && IsRectifiedPair(rig)) {
+    calibration_.baseline_m = -rig.right_from_left.translation.x();
+  } else if (sensor == SensorType::kStereo) {
+    PreparePair(rig);
+  } else if (!rig.left.distortion.empty()) {
+    PrepareSingle(rig);
+  }
+}
+
+Rectifier::~Rectifier() = default;
+
+void Rectifier::PrepareSingle(const CameraRig& rig) {
+  const cv::Size size(rig.left.width_px, rig.left.height_px);
+  cv::Mat matrix = cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
+  for (int step = 0; step < kMaxZoomSteps && !SeesOnlyImage(rig.left, cv::Mat(), matrix); ++step) {
+    ZoomIn(matrix);
+  }
+  calibration_.fx_px = matrix.at<double>(0, 0);
+  calibration_.fy_px = matrix.at<double>(1, 1);
+  calibration_.cx_px = matrix.at<double>(0, 2);
+  calibration_.cy_px = matrix.at<double>(1, 2);
+  maps_ = std::make_unique<Maps>();
+  maps_->left = RemapTable(rig.left, cv::Mat(), matrix);
+  cv::convertMaps(maps_->left.whole, maps_->left.fraction, maps_->nearest.whole, maps_->nearest.fraction, CV_16SC2, true);
+}
+
+// P_left = [f 0 cx 0; 0 f cy 0; 0 0 1 0],  P_right = the same with -f * baseline [px m] in the last column's first row.
+void Rectifier::PreparePair(const CameraRig& rig) {
+  const Eigen::Matrix3d rotation = rig.right_from_left.rotation.toRotationMatrix();
+  cv::Mat cv_rotation(3, 3, CV_64F);
+  cv::Mat cv_translation(3, 1, CV_64F);
+  for (int row = 0; row < 3; ++row) {
+    cv_translation.at<double>(row) = rig.right_from_left.translation[row];
+    for (int column = 0; column < 3; ++column) {
+      cv_rotation.at<double>(row, column) = rotation(row, column);
+    }
+  }
+  const cv::Size size(rig.left.width_px, rig.left.height_px);
+  cv::Mat rectified_from_left, rectified_from_right, left_projection, right_projection, unused;
+  cv::stereoRectify(CameraMatrix(rig.left), rig.left.distortion, CameraMatrix(*rig.right), rig.right->distortion, size,
+                    cv_rotation, cv_translation, rectified_from_left, rectified_from_right, left_projection,
+                    right_projection, unused, cv::CALIB_ZERO_DISPARITY, 0.0, size);
+  for (int step = 0; step < kMaxZoomSteps && !(SeesOnlyImage(rig.left, rectified_from_left, left_projection) &&
+                                               SeesOnlyImage(*rig.right, rectified_from_right, right_projection));
+       ++step) {
+    ZoomIn(left_projection);
+    ZoomIn(right_projection);
+  }
+  calibration_.fx_px = left_projection.at<double>(0, 0);
+  calibration_.fy_px = left_projection.at<double>(1, 1);
+  calibration_.cx_px = left_projection.at<double>(0, 2);
+  calibration_.cy_px = left_projection.at<double>(1, 2);
+  calibration_.baseline_m = -right_projection.at<double>(0, 3) / right_projection.at<double>(0, 0);
+  if (!(calibration_.baseline_m > 0.0)) {
+    throw InputError("the right camera of the pair stands to the left of the left one, or above or below it: "
+                     "check the extrinsics in the calibration, or exchange the cameras");
+  }
+  left_from_rectified_ = Rigid3::FromMatrix(ToEigen(rectified_from_left).transpose(), Eigen::Vector3d::Zero());
+  maps_ = std::make_unique<Maps>();
+  maps_->left = RemapTable(rig.left, rectified_from_left, left_projection);
+  maps_->right = RemapTable(*rig.right, rectified_from_right, right_projection);
+}
+
+GrayImage Rectifier::Left(GrayImage image) const {
+  return maps_ ? maps_->left.Apply(image, CV_8UC1, cv::INTER_LINEAR) : std::move(image);
+}
+
+GrayImage Rectifier::Right(GrayImage image) const {
+  return maps_ ? maps_->right.Apply(image, CV_8UC1, cv::INTER_LINEAR) : std::move(image);
+}
+
+DepthImage Rectifier::Depth(DepthImage image) const {
+  return maps_ ? maps_->nearest.Apply(image, CV_16UC1, cv::INTER_NEAREST) : std::move(image);
+}
+
+}  // namespace tessera

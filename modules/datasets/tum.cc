@@ -1,0 +1,189 @@
+// TUM RGB-D sequences: rgb.txt and depth.txt (`time file`), groundtruth.txt (`time tx ty tz qx qy qz qw`, of the
+// colour camera), times in seconds.
+//
+// The format has no place for a calibration. It is taken from the first of: --camera; calibration.yaml or camera.yaml
+// in the folder; the folder's README where it says `fx=... fy=... cx=... cy=...` and `factor N` (counts per metre) or
+// millimetres; the values that the TUM tools take for any Kinect.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+
+#include "core/errors.h"
+#include "datasets/calibration_file.h"
+#include "datasets/image_file.h"
+#include "datasets/pose_track.h"
+#include "datasets/readme_calibration.h"
+#include "datasets/recording.h"
+#include "datasets/text_file.h"
+
+namespace tessera {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kMaxPairGapUs = 20'000;  // as in the TUM tools: colour and depth are not triggered together
+
+struct TimedFile {
+  int64_t utime_us = 0;
+  std::string path;
+};
+
+std::vector<TimedFile> ReadFileTable(const fs::path& folder, const std::string& table) {
+  std::vector<TimedFile> files;
+  for (const TextRow& row : ReadRows(folder / table)) {
+    const int64_t utime_us = MicrosecondsFromSeconds(row.Number(0));
+    if (row.fields.size() < 2) {
+      throw InputError(row.place + " must hold `time file`: repair the file");
+    }
+    const std::string path = FindImage(folder / row.fields[1]);
+    if (path.empty()) {
+      throw InputError(row.place + " names " + (folder / row.fields[1]).string() +
+                       ", which does not exist: copy the sequence again");
+    }
+    files.push_back({utime_us, path});
+  }
+  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
+  return files;
+}
+
+// Index of the file nearest in time (the earlier of two as near) in the non-empty, ordered list.
+size_t Nearest(const std::vector<TimedFile>& files, int64_t utime_us) {
+  const auto after = std::lower_bound(files.begin(), files.end(), utime_us,
+                                      [](const TimedFile& file, int64_t time) { return file.utime_us < time; });
+  if (after == files.begin()) {
+    return 0;
+  }
+  const auto before = std::prev(after);
+  const bool take_before = after == files.end() || utime_us - before->utime_us <= after->utime_us - utime_us;
+  return static_cast<size_t>((take_before ? before : after) - files.begin());
+}
+
+// Pairs of images that are each other's nearest and at most kMaxPairGapUs apart; so none is used twice.
+std::vector<std::pair<size_t, size_t>> Associate(const std::vector<TimedFile>& color, const std::vector<TimedFile>& depth) {
+  std::vector<std::pair<size_t, size_t>> pairs;
+  for (size_t i = 0; i < color.size(); ++i) {
+    const size_t j = Nearest(depth, color[i].utime_us);
+    const int64_t gap_us = std::abs(depth[j].utime_us - color[i].utime_us);
+    if (gap_us <= kMaxPairGapUs && Nearest(color, depth[j].utime_us) == i) {
+      pairs.emplace_back(i, j);
+    }
+  }
+  return pairs;
+}
+
+void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording) {
+  const std::vector<TimedFile> color = ReadFileTable(folder, "rgb.txt");
+  std::vector<std::string> paths;
+  if (sensor == SensorType::kMono) {
+    for (const TimedFile& file : color) {
+      recording.utimes_us.push_back(file.utime_us);
+      paths.push_back(file.path);
+    }
+    recording.left = ReadImageFiles(std::move(paths));
+    return;
+  }
+  const std::vector<TimedFile> depth = ReadFileTable(folder, "depth.txt");
+  for (const auto& [i, j] : Associate(color, depth)) {
+    recording.utimes_us.push_back(color[i].utime_us);
+    paths.push_back(color[i].path);
+    recording.depth_paths.push_back(depth[j].path);
+  }
+  if (paths.empty()) {
+    throw InputError("folder " + folder.string() + ": no colour image has a depth image within 20 ms: check rgb.txt and depth.txt");
+  }
+  if (paths.size() < color.size()) {
+    recording.notes.push_back(std::to_string(color.size() - paths.size()) +
+                              " colour images without a depth image within 20 ms are skipped.");
+  }
+  recording.left = ReadImageFiles(std::move(paths));
+}
+
+std::string FindReadme(const fs::path& folder) {
+  for (const char* name : {"README", "README.txt", "README.md", "readme.txt", "readme.md", "readme"}) {
+    if (fs::is_regular_file(folder / name)) {
+      return folder / name;
+    }
+  }
+  return "";
+}
+
+std::string Describe(const PinholeCamera& camera) {
+  std::ostringstream text;
+  text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px << " px";
+  return text.str();
+}
+
+// What the folder itself says of its camera, and where it says so, in the notes.
+void CalibrateFromFolder(const fs::path& folder, const SourceOptions& options, Recording& recording) {
+  CameraRig& rig = recording.rig;
+  std::string file = options.calibration_path;
+  for (const char* name : {"calibration.yaml", "camera.yaml"}) {
+    if (file.empty() && fs::is_regular_file(folder / name)) {
+      file = folder / name;
+      recording.notes.push_back("The calibration is taken from " + file + ".");
+    }
+  }
+  const std::string readme = FindReadme(folder);
+  const std::string text = readme.empty() ? "" : ReadFile(readme);
+  if (!file.empty()) {
+    rig = LoadCalibrationFile(file);
+  } else if (const auto camera = PinholeFromText(text)) {
+    rig.left = *camera;
+    recording.notes.push_back("The calibration is taken from " + readme + ": " + Describe(rig.left) + ".");
+  } else {
+    rig.left = {.width_px = 640, .height_px = 480, .fx_px = 525.0, .fy_px = 525.0, .cx_px = 319.5, .cy_px = 239.5};
+    recording.notes.push_back("Warning: " + folder.string() + " says nothing of its camera; " + Describe(rig.left) +
+                              " is assumed, as for any Kinect: give --camera FILE.yaml or put calibration.yaml there.");
+  }
+  if (options.sensor != SensorType::kRgbd || rig.depth_unit_m > 0.0 || options.depth_unit_m > 0.0) {
+    return;
+  }
+  rig.depth_unit_m = DepthUnitFromText(text);
+  const bool is_known = rig.depth_unit_m > 0.0;
+  if (!is_known) {
+    rig.depth_unit_m = 1.0 / 5000.0;
+  }
+  std::ostringstream note;
+  note << (is_known ? "The depth unit is taken from " + readme + ": " : "Warning: the depth unit of the TUM sets is assumed: ")
+       << "1/" << 1.0 / rig.depth_unit_m << " m per count.";
+  recording.notes.push_back(note.str());
+}
+
+void ReadGroundTruth(const fs::path& path, Recording& recording) {
+  if (!fs::exists(path)) {
+    recording.notes.push_back("No ground truth: " + path.string() + " does not exist.");
+    return;
+  }
+  PoseTrack track;
+  for (const TextRow& row : ReadRows(path)) {
+    const Eigen::Quaterniond rotation(row.Number(7), row.Number(4), row.Number(5), row.Number(6));
+    if (std::abs(rotation.norm() - 1.0) > 0.1) {
+      throw InputError(row.place + ": fields 5 to 8 are not a unit quaternion x y z w: repair the file");
+    }
+    track.Add(1000 * MicrosecondsFromSeconds(row.Number(0)),
+              {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});
+  }
+  for (size_t i = 0; i < recording.utimes_us.size(); ++i) {
+    if (const auto pose = track.At(1000 * recording.utimes_us[i])) {
+      recording.ground_truth.push_back({FrameId{static_cast<int64_t>(i)}, recording.utimes_us[i], *pose});
+    }
+  }
+}
+
+}  // namespace
+
+Recording LoadTum(const std::string& folder, const SourceOptions& options) {
+  RequireFolder(folder);
+  if (options.sensor == SensorType::kStereo) {
+    throw InputError("TUM sequence " + folder + " has no second camera: use --sensor mono or rgbd");
+  }
+  Recording recording;
+  recording.times_path = fs::path(folder) / "rgb.txt";
+  CalibrateFromFolder(folder, options, recording);
+  OpenImages(folder, options.sensor, recording);
+  ReadGroundTruth(fs::path(folder) / "groundtruth.txt", recording);
+  return recording;
+}
+
+}  // namespace tessera
