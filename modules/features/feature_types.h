@@ -13,6 +13,8 @@
 
 namespace tessera {
 
+inline constexpr int kMaxLevels = 12;  // of a pyramid: 1.2^11 = 7.4
+
 // What decides the features of an image. Carried in every job, so that all extractors of a pool, and several robots
 // that share it, need no configuration of their own.
 struct FeatureOptions {

@@ -1,0 +1,144 @@
+#include "features/corner_detector.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "features/simd.h"
+
+namespace tessera {
+namespace {
+
+using simd::Max;
+using simd::Min;
+using simd::SubtractSaturated;
+using simd::U8x32;
+
+constexpr int kRowRoom = 32;
+constexpr int kLanes = 32;
+
+// Offsets of the ring of 16 pixels at distance 3, in order around it.
+struct Ring {
+  explicit Ring(ptrdiff_t stride)
+      : offsets{3 * stride,      3 * stride + 1,  2 * stride + 2,  stride + 3,  3,  -stride + 3, -2 * stride + 2,
+                -3 * stride + 1, -3 * stride,     -3 * stride - 1, -2 * stride - 2, -stride - 3, -3, stride - 3,
+                2 * stride - 2,  3 * stride - 1} {}
+  ptrdiff_t offsets[16];
+};
+
+// The largest of the 16 minima over 9 neighbours each, for the values d[0..15] around the ring.
+// Arcs k .. k + 8 and k + 1 .. k + 9 share the eight values k + 1 .. k + 8.
+inline U8x32 BestArc(const U8x32* d) {
+  U8x32 pairs[8];
+  for (int i = 0; i < 8; ++i) pairs[i] = Min(d[2 * i + 1], d[(2 * i + 2) & 15]);
+  U8x32 quads[8];
+  for (int i = 0; i < 8; ++i) quads[i] = Min(pairs[i], pairs[(i + 1) & 7]);
+  U8x32 best = simd::Fill8(0);
+  for (int i = 0; i < 8; ++i) {
+    const U8x32 shared = Min(quads[i], quads[(i + 2) & 7]);
+    best = Max(best, Min(shared, Max(d[2 * i], d[(2 * i + 9) & 15])));
+  }
+  return best;
+}
+
+// Upper bound of BestArc by the four pixels right, left, above and below: nine neighbours hold two of them in sequence.
+inline U8x32 ArcBound(U8x32 below, U8x32 right, U8x32 above, U8x32 left) {
+  return Min(Max(below, above), Max(right, left));
+}
+
+// Scores of the 32 pixels from `p` on; 0 where lower than min_score (which may be left out as well where no pixel of
+// the 32 reaches it).
+inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
+  const U8x32 centre = simd::Load8(p);
+  U8x32 brighter[16];
+  U8x32 darker[16];
+  const auto compare = [&](int i) {
+    const U8x32 value = simd::Load8(p + ring.offsets[i]);
+    brighter[i] = SubtractSaturated(value, centre);
+    darker[i] = SubtractSaturated(centre, value);
+  };
+  for (const int i : {0, 4, 8, 12}) compare(i);
+  const U8x32 bound = Max(ArcBound(brighter[0], brighter[4], brighter[8], brighter[12]),
+                          ArcBound(darker[0], darker[4], darker[8], darker[12]));
+  const U8x32 one = simd::Fill8(1);
+  if (simd::AllZero(SubtractSaturated(SubtractSaturated(bound, one), below_min_score))) return simd::Fill8(0);
+  for (const int i : {1, 2, 3, 5, 6, 7, 9, 10, 11, 13, 14, 15}) compare(i);
+  return SubtractSaturated(Max(BestArc(brighter), BestArc(darker)), one);
+}
+
+}  // namespace
+
+void CornerDetector::ScoreRow(const LevelImage& image, const Rect& corners, int y, int min_score) {
+  const Ring ring(image.stride());
+  const U8x32 below_min_score = simd::Fill8(static_cast<uint8_t>(min_score - 1));
+  uint8_t* out = ScoreRowAt(y) + kRowRoom - 1;
+  const uint8_t* in = image.At(corners.x - 1, y);
+  for (int x = 0; x < corners.width + 2; x += kLanes) simd::Store(out + x, Scores(in + x, ring, below_min_score));
+}
+
+void CornerDetector::Insert(size_t cell, Corner corner) {
+  Corner* const begin = &best_[cell * static_cast<size_t>(capacity_)];
+  int& count = num_best_[cell];
+  Corner* place = begin + std::min(count, capacity_ - 1);
+  for (; place > begin && place[-1].score < corner.score; --place) *place = place[-1];
+  *place = corner;
+  count = std::min(count + 1, capacity_);
+  if (count == capacity_) lowest_[cell] = begin[capacity_ - 1].score;
+}
+
+void CornerDetector::KeepMaxima(const Rect& corners, int y, int min_score) {
+  static_assert(kCellPx == kLanes, "one vector is one row of a cell");
+  const U8x32 below_min_score = simd::Fill8(static_cast<uint8_t>(min_score - 1));
+  const uint8_t* above = ScoreRowAt(y - 1) + kRowRoom;
+  const uint8_t* row = ScoreRowAt(y) + kRowRoom;
+  const uint8_t* below = ScoreRowAt(y + 1) + kRowRoom;
+  size_t cell = 0;
+  for (int x = 0; x < corners.width; x += kLanes, ++cell) {
+    const U8x32 score = simd::Load8(row + x);
+    if (simd::AllZero(SubtractSaturated(score, below_min_score))) continue;
+    const U8x32 before = Max(Max(simd::Load8(above + x - 1), simd::Load8(above + x)),
+                             Max(simd::Load8(above + x + 1), simd::Load8(row + x - 1)));
+    const U8x32 after = Max(Max(simd::Load8(below + x - 1), simd::Load8(below + x)),
+                            Max(simd::Load8(below + x + 1), simd::Load8(row + x + 1)));
+    const U8x32 bar = Max(Max(before, SubtractSaturated(after, simd::Fill8(1))), simd::Fill8(lowest_[cell]));
+    uint32_t maxima = simd::GreaterMask(score, bar);
+    const int num_columns = std::min(corners.width - x, kLanes);
+    if (num_columns < kLanes) maxima &= (1U << num_columns) - 1U;
+    for (; maxima != 0; maxima &= maxima - 1) {
+      const int column = x + std::countr_zero(maxima);
+      if (row[column] > lowest_[cell]) {
+        Insert(cell, {static_cast<int16_t>(corners.x + column), static_cast<int16_t>(y), row[column]});
+      }
+    }
+  }
+}
+
+void CornerDetector::Detect(const LevelImage& image, const LevelPlan& plan, int level, int min_score, int capacity,
+                            std::vector<Candidate>& out) {
+  const Rect& corners = plan.corners;
+  if (corners.empty()) return;
+  const auto num_columns = static_cast<size_t>(plan.cell_columns.size());
+  capacity_ = capacity;
+  best_.resize(std::max(best_.size(), num_columns * static_cast<size_t>(capacity)));
+  num_best_.assign(num_columns, 0);
+  lowest_.assign(num_columns, static_cast<uint8_t>(min_score - 1));
+  for (auto& row : score_rows_) row.resize(std::max(row.size(), static_cast<size_t>(corners.width) + 3 * kRowRoom));
+
+  ScoreRow(image, corners, corners.y - 1, min_score);
+  ScoreRow(image, corners, corners.y, min_score);
+  for (int y = corners.y; y < corners.bottom(); ++y) {
+    ScoreRow(image, corners, y + 1, min_score);
+    KeepMaxima(corners, y, min_score);
+    const bool is_last_row_of_cells = (y + 1 - kBorderPx) % kCellPx == 0 || y + 1 == corners.bottom();
+    if (!is_last_row_of_cells) continue;
+    for (size_t cell = 0; cell < num_columns; ++cell) {
+      for (int i = 0; i < num_best_[cell]; ++i) {
+        const Corner& corner = best_[cell * static_cast<size_t>(capacity_) + static_cast<size_t>(i)];
+        out.push_back({.x = corner.x, .y = corner.y, .level = static_cast<uint8_t>(level), .score = corner.score});
+      }
+      num_best_[cell] = 0;
+      lowest_[cell] = static_cast<uint8_t>(min_score - 1);
+    }
+  }
+}
+
+}  // namespace tessera

@@ -1,0 +1,109 @@
+#include "features/extractor.h"
+
+#include <stdexcept>
+
+#include "features/selection.h"
+#include "features/tiling.h"
+
+namespace tessera {
+namespace {
+
+// Nearest level-0 pixel of the candidate.
+float DepthAt(const TileJob& job, const Candidate& candidate) {
+  const int x = LevelZeroEdge(2 * candidate.x + 1, candidate.level) - job.depth_rect.x;
+  const int y = LevelZeroEdge(2 * candidate.y + 1, candidate.level) - job.depth_rect.y;
+  return static_cast<float>(job.depth.row(y)[x] * job.calibration.depth_unit_m);
+}
+
+bool IsWholeImage(const TileJob& job) {
+  return job.first_level == 0 && job.last_level == job.options.num_levels - 1 &&
+         job.core == Rect{0, 0, job.calibration.width_px, job.calibration.height_px};
+}
+
+}  // namespace
+
+TileFeatures Extractor::Extract(const TileJob& job) {
+  if (const std::string error = CheckTileJob(job); !error.empty()) throw std::invalid_argument(error);
+  plan_ = PlanTile(job.calibration, job.options, job.core, job.first_level, job.last_level);
+  BuildPyramids(job);
+  DetectCandidates(job);
+
+  TileFeatures features{.frame = job.frame,
+                        .utime_us = job.utime_us,
+                        .arrival_us = job.arrival_us,
+                        .tile = job.tile,
+                        .num_tiles = job.num_tiles,
+                        .calibration = job.calibration,
+                        .options = job.options,
+                        .candidates = {},
+                        .descriptors = {}};
+  DescribeCandidates(features);
+  if (job.calibration.sensor == SensorType::kStereo) MatchCandidates(job.options);
+  if (job.calibration.sensor == SensorType::kRgbd) {
+    for (Candidate& candidate : candidates_) candidate.depth_m = DepthAt(job, candidate);
+  }
+  features.candidates = candidates_;
+  return features;
+}
+
+void Extractor::BuildPyramids(const TileJob& job) {
+  const bool is_stereo = job.calibration.sensor == SensorType::kStereo;
+  CopyRegion(job.left, job.left_rect, plan_.levels[0].left, left_[0]);
+  if (is_stereo) CopyRegion(job.right, job.right_rect, plan_.levels[0].right, right_[0]);
+  for (auto level = size_t{1}; level <= static_cast<size_t>(job.last_level); ++level) {
+    left_[level].Reset(plan_.levels[level].left);
+    reducer_.Reduce(left_[level - 1], left_[level]);
+    if (!is_stereo) continue;
+    right_[level].Reset(plan_.levels[level].right);
+    reducer_.Reduce(right_[level - 1], right_[level]);
+  }
+}
+
+void Extractor::DetectCandidates(const TileJob& job) {
+  candidates_.clear();
+  for (int level = job.first_level; level <= job.last_level; ++level) {
+    const auto l = static_cast<size_t>(level);
+    const LevelPlan& plan = plan_.levels[l];
+    const int capacity = CellCapacity(job.options, level, plan.width, plan.height);
+    detector_.Detect(left_[l], plan, level, job.options.min_score, capacity, candidates_);
+  }
+  if (!IsWholeImage(job)) return;
+  // Nothing of the image is missing, so those that will not be selected need no descriptor.
+  std::vector<Candidate> chosen;
+  for (const uint32_t index : ChooseCandidates(job.calibration, job.options, candidates_)) {
+    chosen.push_back(candidates_[index]);
+  }
+  candidates_.swap(chosen);
+}
+
+void Extractor::DescribeCandidates(TileFeatures& features) {
+  int smoothed_level = -1;
+  features.descriptors.reserve(candidates_.size());
+  for (Candidate& candidate : candidates_) {  // level after level
+    const auto level = static_cast<size_t>(candidate.level);
+    if (candidate.level != smoothed_level) {
+      smoothed_level = candidate.level;
+      const Rect& corners = plan_.levels[level].corners;
+      const Rect patches{.x = corners.x - kPatchRadiusPx,
+                         .y = corners.y - kPatchRadiusPx,
+                         .width = corners.width + 2 * kPatchRadiusPx,
+                         .height = corners.height + 2 * kPatchRadiusPx};
+      smoother_.Smooth(left_[level], patches, smoothed_[level]);
+    }
+    candidate.angle = Orientation(left_[level], candidate.x, candidate.y);
+    features.descriptors.push_back(Describe(smoothed_[level], candidate.x, candidate.y, candidate.angle));
+  }
+}
+
+void Extractor::MatchCandidates(const FeatureOptions& options) {
+  for (Candidate& candidate : candidates_) {
+    const auto level = static_cast<size_t>(candidate.level);
+    const std::optional<int> right_x = matcher_.Match(left_[level], right_[level], candidate.x, candidate.y,
+                                                      LevelDisparity(options, candidate.level));
+    if (!right_x) continue;
+    candidate.right_x_px =
+        LevelZeroPosition(static_cast<double>(*right_x) / StereoMatcher::kSubpixels, candidate.level);
+  }
+}
+
+}  // namespace tessera

@@ -1,0 +1,82 @@
+#include "features/stereo_matcher.h"
+
+#include <algorithm>
+
+#include "features/simd.h"
+#include "features/tile_plan.h"
+
+namespace tessera {
+namespace {
+
+using simd::SubtractSaturated;
+using simd::U16x16;
+using simd::U8x32;
+
+constexpr int kRadius = kStereoRadiusPx;
+constexpr int kWindow = 2 * kRadius + 1;
+constexpr int kMaxDifference = 23;  // 11 of them, one row of the window, fit a byte
+static_assert(kMaxDifference * kWindow <= 255);
+
+// A match must cost at most this on average per pixel, ...
+constexpr int kMaxMeanCost = 9;
+// ... and at most 4/5 of any other place that isn't next to it.
+constexpr int kUniqueNumerator = 4;
+constexpr int kUniqueDenominator = 5;
+constexpr int kNeighbourhood = 2;
+
+// Where between the places -1 and 1 a parabola through three costs has its minimum, in 1/64; before and after >= best.
+int ParabolaMinimum(int before, int best, int after) {
+  const int curvature = before - 2 * best + after;
+  if (curvature == 0) return 0;
+  return (before - after) * (StereoMatcher::kSubpixels / 2) / curvature;
+}
+
+}  // namespace
+
+void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count) {
+  const U8x32 limit = simd::Fill8(kMaxDifference);
+  for (int p = 0; p < count; p += 32) {
+    U16x16 even = simd::Fill16(0);
+    U16x16 odd = simd::Fill16(0);
+    for (int j = -kRadius; j <= kRadius; ++j) {
+      const uint8_t* left_row = left.At(x - kRadius, y + j);
+      const uint8_t* right_row = right.At(first + p - kRadius, y + j);
+      U8x32 row_cost = simd::Fill8(0);
+      for (int i = 0; i < kWindow; ++i) {
+        const U8x32 a = simd::Fill8(left_row[i]);
+        const U8x32 b = simd::Load8(right_row + i);
+        const U8x32 difference = simd::Max(SubtractSaturated(a, b), SubtractSaturated(b, a));
+        row_cost = simd::Add(row_cost, simd::Min(difference, limit));
+      }
+      even = simd::Add(even, simd::EvenBytes(row_cost));
+      odd = simd::Add(odd, simd::OddBytes(row_cost));
+    }
+    uint16_t even_costs[16];
+    uint16_t odd_costs[16];
+    simd::Store(even_costs, even);
+    simd::Store(odd_costs, odd);
+    for (size_t i = 0; i < 16; ++i) {
+      costs_[static_cast<size_t>(p) + 2 * i] = even_costs[i];
+      costs_[static_cast<size_t>(p) + 2 * i + 1] = odd_costs[i];
+    }
+  }
+}
+
+std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage& right, int x, int y, int max_disparity) {
+  // One place more at both ends lets the first and the last one have neighbours.
+  const int first = std::max(x - max_disparity - 1, kRadius);
+  const int count = x + 2 - first;
+  ComputeCosts(left, right, x, y, first, count);
+  const auto begin = costs_.begin();
+  const auto end = begin + count;
+  const auto best = std::min_element(begin + 1, end - 1);
+  if (*best > kMaxMeanCost * kWindow * kWindow) return std::nullopt;
+  const auto second = [&](auto from, auto to) { return from < to ? *std::min_element(from, to) : uint16_t{UINT16_MAX}; };
+  const int other = std::min(second(begin, best - std::min<ptrdiff_t>(best - begin, kNeighbourhood)),
+                             second(best + std::min<ptrdiff_t>(end - best, kNeighbourhood + 1), end));
+  if (*best * kUniqueDenominator > other * kUniqueNumerator) return std::nullopt;
+  const int place = first + static_cast<int>(best - begin);
+  return std::min(place * kSubpixels + ParabolaMinimum(best[-1], *best, best[1]), x * kSubpixels);
+}
+
+}  // namespace tessera

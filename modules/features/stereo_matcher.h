@@ -1,0 +1,31 @@
+// Match of a keypoint along its row in the rectified right image.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "features/pyramid.h"
+
+namespace tessera {
+
+class StereoMatcher {
+ public:
+  static constexpr int kSubpixels = 64;  // positions are counted in 1/64 px
+
+  // Position of the pixel (x, y) of the left image in the right image, in 1/64 px of the level, at most max_disparity to
+  // the left of x; nullopt if no place matches well, or more than one does. Compares windows of 11 x 11 px by
+  //
+  //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, y + j)|, 23),
+  //
+  // so that single pixels that differ much (occlusions, highlights) weigh no more than others.
+  // The left image must hold kStereoRadiusPx around (x, y), the right one what LevelPlan::right says.
+  std::optional<int> Match(const LevelImage& left, const LevelImage& right, int x, int y, int max_disparity);
+
+ private:
+  void ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
+
+  std::array<uint16_t, 1120> costs_;  // of the places first, first + 1, ... of the right image
+};
+
+}  // namespace tessera

@@ -1,0 +1,165 @@
+#include "features/tiling.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "core/errors.h"
+#include "features/tile_plan.h"
+
+namespace tessera {
+namespace {
+
+bool Contains(const Rect& outer, const Rect& inner) {
+  return inner.empty() || (inner.x >= outer.x && inner.y >= outer.y && inner.right() <= outer.right() &&
+                           inner.bottom() <= outer.bottom());
+}
+
+// The rectangle has sane numbers and lies within an image of this size; it may be empty.
+bool LiesWithin(const Rect& rect, const CameraCalibration& calibration) {
+  const auto is_part = [](int begin, int size, int whole) {
+    return begin >= 0 && size >= 0 && begin <= whole && size <= whole - begin;
+  };
+  return is_part(rect.x, rect.width, calibration.width_px) && is_part(rect.y, rect.height, calibration.height_px);
+}
+
+template <class Pixel>
+bool HasSize(const Image<Pixel>& image, int width, int height) {
+  return image.width == width && image.height == height &&
+         image.pixels.size() == static_cast<size_t>(width) * static_cast<size_t>(height);
+}
+
+// Empty, or what is wrong with the pixels of one image of a job.
+template <class Pixel>
+std::string CheckPart(const char* name, const CameraCalibration& calibration, const Rect& rect, const Image<Pixel>& image,
+                      const Rect& needed) {
+  if (!LiesWithin(rect, calibration)) return std::string("the ") + name + " rectangle leaves the image";
+  if (!HasSize(image, rect.width, rect.height)) {
+    return std::string("the ") + name + " pixels are not as many as the rectangle's";
+  }
+  if (!Contains(rect, needed)) return std::string("the ") + name + " pixels lack the margin that the tile needs";
+  return "";
+}
+
+std::string CheckNumbers(const TileJob& job) {
+  if (!job.frame.valid()) return "the frame number is negative";
+  if (job.num_tiles < 1 || job.tile < 0 || job.tile >= job.num_tiles) {
+    return "there are " + std::to_string(job.num_tiles) + " tiles";
+  }
+  if (const std::string error = job.calibration.Check(); !error.empty()) return error;
+  if (const std::string error = job.options.Check(); !error.empty()) return error;
+  if (job.first_level < 0 || job.last_level < job.first_level || job.last_level >= job.options.num_levels) {
+    return "levels " + std::to_string(job.first_level) + " to " + std::to_string(job.last_level) +
+           " are not a range of the pyramid's " + std::to_string(job.options.num_levels);
+  }
+  if (!LiesWithin(job.core, job.calibration)) return "the core leaves the image";
+  return "";
+}
+
+// Rectangles and pixels of the job, for the core that it has.
+void TakePixels(const CameraFrame& frame, TileJob& job, const TilePlan& plan) {
+  job.left_rect = plan.levels[0].left;
+  job.left = Crop(frame.left, job.left_rect);
+  if (job.calibration.sensor == SensorType::kStereo) {
+    job.right_rect = plan.levels[0].right;
+    job.right = Crop(frame.right, job.right_rect);
+  }
+  if (job.calibration.sensor == SensorType::kRgbd) {
+    job.depth_rect = plan.depth;
+    job.depth = Crop(frame.depth, job.depth_rect);
+  }
+}
+
+void CheckFrame(const CameraFrame& frame, const CameraCalibration& calibration, const FeatureOptions& options) {
+  const std::string where = "frame " + std::to_string(frame.id.value) + ": ";
+  if (const std::string error = calibration.Check(); !error.empty()) throw InputError(where + error);
+  if (const std::string error = options.Check(); !error.empty()) throw InputError(where + error);
+  const auto fits = [&calibration](const auto& image) {
+    return HasSize(image, calibration.width_px, calibration.height_px);
+  };
+  const SensorType sensor = calibration.sensor;
+  if (!fits(frame.left) || (sensor == SensorType::kStereo && !fits(frame.right)) ||
+      (sensor == SensorType::kRgbd && !fits(frame.depth))) {
+    throw InputError(where + "its images are not all " + std::to_string(calibration.width_px) + "x" +
+                     std::to_string(calibration.height_px) + " px as the calibration says");
+  }
+}
+
+}  // namespace
+
+TileGrid ParseTileGrid(const std::string& text) {
+  TileGrid grid;
+  const char* const end = text.data() + text.size();
+  const auto [separator, lines_error] = std::from_chars(text.data(), end, grid.lines);
+  bool is_good = lines_error == std::errc() && separator != end && *separator == 'x';
+  if (is_good) {
+    const auto [rest, columns_error] = std::from_chars(separator + 1, end, grid.columns);
+    is_good = columns_error == std::errc() && rest == end;
+  }
+  const auto in_range = [](int side) { return side >= 1 && side <= TileGrid::kMaxSide; };
+  if (!is_good || !in_range(grid.lines) || !in_range(grid.columns)) {
+    throw InputError("tiles \"" + text + "\" must be LINESxCOLUMNS with whole numbers from 1 to " +
+                     std::to_string(TileGrid::kMaxSide) + ", such as 2x3");
+  }
+  return grid;
+}
+
+std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t arrival_us,
+                              TileGrid grid, int coarse_levels_from, const FeatureOptions& options) {
+  CheckFrame(frame, calibration, options);
+  std::vector<TileJob> jobs;
+  const auto add = [&](const Rect& core, int first_level, int last_level, bool even_if_idle) {
+    if (first_level > last_level) return;
+    const TilePlan plan = PlanTile(calibration, options, core, first_level, last_level);
+    if (!plan.HasCells() && !even_if_idle) return;
+    TileJob& job = jobs.emplace_back();
+    job.frame = frame.id;
+    job.utime_us = frame.utime_us;
+    job.arrival_us = arrival_us;
+    job.calibration = calibration;
+    job.options = options;
+    job.first_level = first_level;
+    job.last_level = last_level;
+    job.core = core;
+    TakePixels(frame, job, plan);
+  };
+
+  const Rect whole{.x = 0, .y = 0, .width = calibration.width_px, .height = calibration.height_px};
+  const bool is_cut = grid.lines * grid.columns > 1;
+  const int first_coarse_level = is_cut ? std::clamp(coarse_levels_from, 0, options.num_levels) : 0;
+  add(whole, first_coarse_level, options.num_levels - 1, false);
+  for (int line = 0; is_cut && line < grid.lines; ++line) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const int x = whole.width * column / grid.columns;
+      const int y = whole.height * line / grid.lines;
+      const Rect core{.x = x,
+                      .y = y,
+                      .width = whole.width * (column + 1) / grid.columns - x,
+                      .height = whole.height * (line + 1) / grid.lines - y};
+      add(core, 0, first_coarse_level - 1, false);
+    }
+  }
+  if (jobs.empty()) add(whole, 0, options.num_levels - 1, true);  // every frame has an answer
+  for (size_t tile = 0; tile < jobs.size(); ++tile) {
+    jobs[tile].tile = static_cast<int32_t>(tile);
+    jobs[tile].num_tiles = static_cast<int32_t>(jobs.size());
+  }
+  return jobs;
+}
+
+std::string CheckTileJob(const TileJob& job) {
+  std::string error = CheckNumbers(job);
+  if (error.empty()) {
+    const TilePlan plan = PlanTile(job.calibration, job.options, job.core, job.first_level, job.last_level);
+    error = CheckPart("left", job.calibration, job.left_rect, job.left, plan.levels[0].left);
+    if (error.empty() && job.calibration.sensor == SensorType::kStereo) {
+      error = CheckPart("right", job.calibration, job.right_rect, job.right, plan.levels[0].right);
+    }
+    if (error.empty() && job.calibration.sensor == SensorType::kRgbd) {
+      error = CheckPart("depth", job.calibration, job.depth_rect, job.depth, plan.depth);
+    }
+  }
+  if (error.empty()) return "";
+  return "tile " + std::to_string(job.tile) + " of frame " + std::to_string(job.frame.value) + ": " + error;
+}
+
+}  // namespace tessera

@@ -1,0 +1,40 @@
+// Cuts frames into jobs for extractors, without loss: the features of the jobs together are those of the whole frame.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "features/feature_types.h"
+#include "geometry/camera_frame.h"
+
+namespace tessera {
+
+struct TileGrid {
+  static constexpr int kMaxSide = 64;  // lines or columns
+
+  int lines = 1;
+  int columns = 1;
+
+  bool operator==(const TileGrid&) const = default;
+};
+
+// "2x3": two lines, three columns. Throws InputError if it isn't two whole numbers from 1 to kMaxSide.
+TileGrid ParseTileGrid(const std::string& text);
+
+// The jobs of one frame, num_tiles of them, in the order in which they are best given out.
+//
+// A 1x1 grid makes one job with all levels of the pyramid. Otherwise a first job, the longest, has the coarse levels from
+// `coarse_levels_from` up, of the whole image (their margins would be wide in level-0 pixels); then each tile of the grid,
+// line by line, has the levels below that. Tiles that have nothing to detect are left out.
+//
+// arrival_us is copied into the jobs. Throws InputError if the options, the calibration or the sizes of the images are
+// wrong.
+std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t arrival_us,
+                              TileGrid grid, int coarse_levels_from, const FeatureOptions& options);
+
+// Empty if an extractor can work on the job: ranges and sizes are right, and the pixels that the core needs are there.
+// Else one sentence.
+std::string CheckTileJob(const TileJob& job);
+
+}  // namespace tessera
