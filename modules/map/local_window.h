@@ -1,0 +1,28 @@
+// Which part of the map a local bundle adjustment works on.
+#pragma once
+
+#include <vector>
+
+#include "map/map.h"
+
+namespace tessera {
+
+struct LocalWindowOptions {
+  int max_inner_keyframes = 12;  // poses that move
+  int min_shared_landmarks = 15; // a keyframe that shares fewer with the centre is no neighbour (as in ORB-SLAM)
+  int max_outer_keyframes = 20;  // poses that hold the window in place; those that see most of its landmarks
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+struct LocalWindow {
+  std::vector<KeyframeId> inner;      // the centre and its neighbours, by id
+  std::vector<KeyframeId> outer;      // others that see the same landmarks, by id
+  std::vector<LandmarkId> landmarks;  // seen by an inner keyframe and by two keyframes of the window at least, by id
+};
+
+// The window around `center`, a keyframe of the map.
+LocalWindow SelectLocalWindow(const Map& map, KeyframeId center, const LocalWindowOptions& options);
+
+}  // namespace tessera
