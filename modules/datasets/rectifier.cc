@@ -1,5 +1,6 @@
 #include "datasets/rectifier.h"
 
+#include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -107,6 +108,10 @@ Rectifier::~Rectifier() = default;
 void Rectifier::PrepareSingle(const CameraRig& rig) {
   const cv::Size size(rig.left.width_px, rig.left.height_px);
   cv::Mat matrix = cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
+  // OpenCV would squeeze the two directions differently; features rely on patches that turn and scale evenly.
+  const double scale = std::max(matrix.at<double>(0, 0) / rig.left.fx_px, matrix.at<double>(1, 1) / rig.left.fy_px);
+  matrix.at<double>(0, 0) = scale * rig.left.fx_px;
+  matrix.at<double>(1, 1) = scale * rig.left.fy_px;
   for (int step = 0; step < kMaxZoomSteps && !SeesOnlyImage(rig.left, cv::Mat(), matrix); ++step) {
     ZoomIn(matrix);
   }
