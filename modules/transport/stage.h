@@ -61,7 +61,10 @@ class StageContext {
   const Settings& settings() const;
   const std::string& name() const;  // "extractor_2"
   int id() const;                   // the 2 in it; 0 for a stage that exists once
-  int64_t epoch_us() const;
+  int64_t epoch_us() const;  // when it started, wall clock
+  // A clock that never jumps, for time-outs and rates only. Tests on a MemoryBus let it run as fast as they like, so
+  // a stage asks this one and no other.
+  int64_t now_us() const;
 
   // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
   template <class Value>
