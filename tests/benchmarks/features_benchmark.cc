@@ -1,0 +1,103 @@
+// Time of extraction and selection on one thread, against cv::ORB with the same number of keypoints. Every iteration
+// takes the next of several images spread over KITTI sequence 03, or of as many made ones where that is absent.
+#include <benchmark/benchmark.h>
+
+#include <opencv2/features2d.hpp>
+
+#include "features/extractor.h"
+#include "features/feature_images.h"
+#include "features/selection.h"
+#include "features/tiling.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kNumImages = 16;
+
+// Frames 0, 50, 100, ... of the sequence.
+const std::vector<GrayImage>& Images() {
+  static const std::vector<GrayImage> images = [] {
+    std::vector<GrayImage> result;
+    for (int i = 0; i < kNumImages; ++i) {
+      const std::optional<GrayImage> image = ReadKittiImage(50 * i);
+      result.push_back(image ? *image : MakeTexture(1241, 376, static_cast<uint32_t>(i)));
+    }
+    return result;
+  }();
+  return images;
+}
+
+// The jobs of each image under this cut.
+std::vector<std::vector<TileJob>> Cut(SensorType sensor, TileGrid grid, int coarse_levels_from) {
+  std::vector<std::vector<TileJob>> jobs;
+  for (const GrayImage& image : Images()) {
+    const CameraCalibration calibration = MakeCalibration(sensor, image.width, image.height);
+    jobs.push_back(CutFrame(MakeFrame(sensor, image), calibration, 0, grid, coarse_levels_from, FeatureOptions{}));
+  }
+  return jobs;
+}
+
+void CvOrb(benchmark::State& state) {
+  cv::setNumThreads(1);
+  const cv::Ptr<cv::ORB> orb = cv::ORB::create(FeatureOptions{}.num_features);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  size_t i = 0;
+  for (auto _ : state) {
+    const GrayImage& image = Images()[i++ % kNumImages];
+    const cv::Mat mat(image.height, image.width, CV_8U, const_cast<uint8_t*>(image.pixels.data()));
+    orb->detectAndCompute(mat, cv::noArray(), keypoints, descriptors);
+    benchmark::DoNotOptimize(descriptors.data);
+  }
+  state.counters["keypoints"] = static_cast<double>(keypoints.size());
+}
+
+// Extraction of all jobs of an image by one extractor, and selection.
+void Extraction(benchmark::State& state, SensorType sensor, TileGrid grid, int coarse_levels_from) {
+  const std::vector<std::vector<TileJob>> jobs = Cut(sensor, grid, coarse_levels_from);
+  Extractor extractor;
+  FeatureFrame frame;
+  size_t num_candidates = 0;
+  size_t i = 0;
+  for (auto _ : state) {
+    std::vector<TileFeatures> tiles;
+    num_candidates = 0;
+    for (const TileJob& job : jobs[i++ % kNumImages]) {
+      tiles.push_back(extractor.Extract(job));
+      num_candidates += tiles.back().candidates.size();
+    }
+    frame = SelectFeatures(tiles);
+    benchmark::DoNotOptimize(frame.keypoints.data());
+  }
+  size_t bytes = 0;
+  for (const TileJob& job : jobs.front()) {
+    bytes += job.left.pixels.size() + job.right.pixels.size() + 2 * job.depth.pixels.size();
+  }
+  state.counters["keypoints"] = static_cast<double>(frame.keypoints.size());
+  state.counters["candidates"] = static_cast<double>(num_candidates);
+  state.counters["wire_kB"] = static_cast<double>(bytes) / 1000.0;
+}
+
+// What the dispatcher does.
+void Cutting(benchmark::State& state, TileGrid grid, int coarse_levels_from) {
+  const GrayImage& image = Images().front();
+  const CameraFrame frame = MakeFrame(SensorType::kMono, image);
+  const CameraCalibration calibration = MakeCalibration(SensorType::kMono, image.width, image.height);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(CutFrame(frame, calibration, 0, grid, coarse_levels_from, FeatureOptions{}).data());
+  }
+}
+
+BENCHMARK(CvOrb)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, whole, SensorType::kMono, TileGrid{1, 1}, 0)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x2, SensorType::kMono, TileGrid{2, 2}, 4)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8, SensorType::kMono, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_2, SensorType::kMono, TileGrid{2, 8}, 2)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_3, SensorType::kMono, TileGrid{2, 8}, 3)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_8, SensorType::kMono, TileGrid{2, 8}, 8)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, whole_stereo, SensorType::kStereo, TileGrid{1, 1}, 0)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_stereo, SensorType::kStereo, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Cutting, cut_2x8, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace tessera
