@@ -1,0 +1,1 @@
+"""The `tessera` command behind `setup`: starts and watches the processes of a run, and reports what came out."""

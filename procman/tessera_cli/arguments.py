@@ -1,0 +1,150 @@
+"""What people type. Uses the standard library alone, so that --help works before anything is installed."""
+
+import argparse
+import os
+import re
+
+SOURCES = """\
+SOURCE is one of
+  kitti:DIR    a sequence folder of the KITTI odometry benchmark
+  euroc:DIR    holds mav0/
+  tum:DIR      TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt
+  video:FILE   any video file that OpenCV reads; needs --camera
+  camera:N     V4L2 device /dev/videoN; needs --camera
+  rtsp://...   network stream; needs --camera
+  log:FILE     a log recorded by `tessera record`, `tessera run --record` or lcm-logger
+  bus:[URL]    frames that another program, such as lcm-logplayer, publishes; default: this stack's main bus
+"""
+
+RUN_EXAMPLES = """
+examples:
+  procman/tessera run kitti:data/kitti/sequences/03 --extractors 2 --tiles 2x2
+  procman/tessera run euroc:data/MH_01 --sensor stereo --out logs/mh01
+  procman/tessera run video:drive.mp4 --camera my_camera.yaml --frames 100:600
+  procman/tessera run bus: & .venv/bin/lcm-logplayer drive.lcmlog
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one sentence instead of printing the whole usage."""
+
+    def error(self, message: str):
+        self.exit(2, f"tessera: {message.removeprefix('argument ')}; {self.prog} --help explains the arguments.\n")
+
+
+def whole_number(minimum: int, maximum: int):
+    def parse(text: str) -> int:
+        if not re.fullmatch(r"-?\d{1,9}", text) or not minimum <= int(text) <= maximum:
+            raise argparse.ArgumentTypeError(f"must be a whole number from {minimum} to {maximum}, not '{text}'")
+        return int(text)
+
+    return parse
+
+
+def tiles(text: str) -> str:
+    if not re.fullmatch(r"0*[1-9]\d{0,2}x0*[1-9]\d{0,2}", text):
+        raise argparse.ArgumentTypeError(f"must be LINESxCOLUMNS, both at least 1, such as 2x4, not '{text}'")
+    return "x".join(str(int(part)) for part in text.split("x"))
+
+
+def pace(text: str) -> str:
+    if text in ("lockstep", "realtime"):
+        return text
+    if re.fullmatch(r"\d+(\.\d+)?|\.\d+", text) and float(text) > 0:
+        return str(float(text))
+    raise argparse.ArgumentTypeError(f"must be lockstep, realtime or a speed factor such as 0.5, not '{text}'")
+
+
+def frames(text: str) -> tuple[int, int]:
+    """`A:B` as (first, last), `last` exclusive and -1 where it is left out."""
+    match = re.fullmatch(r"(\d{0,9}):(\d{0,9})", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"must be A:B, the first frame and the one behind the last, not '{text}'")
+    first, last = int(match[1] or 0), int(match[2]) if match[2] else -1
+    if last != -1 and last <= first:
+        raise argparse.ArgumentTypeError(f"holds no frame: '{text}' must have A < B")
+    return first, last
+
+
+def assignment(text: str) -> str:
+    if not re.fullmatch(r"[^=]+=.*", text, re.DOTALL):
+        raise argparse.ArgumentTypeError(f"must be section.key=value, not '{text}'")
+    return text
+
+
+def add_source_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--sensor", choices=("mono", "stereo", "rgbd"), default="mono", help="default mono")
+    parser.add_argument("--camera", metavar="FILE.yaml", help="calibration, where the source brings none, or instead of its own")
+    parser.add_argument("--frames", type=frames, metavar="A:B", default=(0, -1), help="only frames A..B-1")
+    parser.add_argument("--set", dest="settings", type=assignment, metavar="section.key=value", action="append", default=[],
+                        help="any setting of config/default.yaml; may be repeated")
+
+
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    add_source_options(parser)
+    parser.add_argument("--extractors", type=whole_number(1, 256), metavar="P", default=os.cpu_count() or 1,
+                        help="extractor processes, default: cores of this machine")
+    parser.add_argument("--tiles", type=tiles, metavar="LxC", default="1x1", help="lines x columns that an image is cut into, default 1x1")
+    parser.add_argument("--features", type=whole_number(1, 100000), metavar="N", help="keypoints per image, default 2000")
+    parser.add_argument("--pace", type=pace, metavar="lockstep|realtime|X",
+                        help="default lockstep for files, realtime for cameras; X is a speed factor")
+    parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-<source name>")
+    parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
+    add_port(parser)
+
+
+def add_port(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--port", type=whole_number(1024, 65000), metavar="N", default=7667,
+                        help="base port of the buses, for a second stack on one machine; default 7667")
+
+
+def add_command(commands, name: str, module: str, summary: str, epilog: str = "") -> argparse.ArgumentParser:
+    parser = commands.add_parser(name, help=summary, description=summary, epilog=epilog, allow_abbrev=False,
+                                 formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.set_defaults(module=module)
+    return parser
+
+
+def add_run_commands(commands) -> None:
+    run = add_command(commands, "run", "run", "The whole stack on this machine, until the source ends or Ctrl-C.",
+                      SOURCES + RUN_EXAMPLES)
+    run.add_argument("source", metavar="SOURCE", help="see below")
+    run.set_defaults(source_prefix="")
+    add_run_options(run)
+    replay = add_command(commands, "replay", "run", "The whole stack, fed by a recorded LCM log.",
+                         "examples:\n  procman/tessera replay logs/drive.lcmlog --extractors 2\n")
+    replay.add_argument("source", metavar="LOG")
+    replay.set_defaults(source_prefix="log:")
+    add_run_options(replay)
+    record = add_command(commands, "record", "record", "Writes a source into an LCM log that stock lcm-logplayer can play.",
+                         SOURCES + "\nexamples:\n  procman/tessera record kitti:data/kitti/sequences/03 logs/03.lcmlog\n")
+    record.add_argument("source", metavar="SOURCE", help="see below")
+    record.add_argument("log", metavar="LOG", help="the file to write")
+    add_source_options(record)
+
+
+def add_look_commands(commands) -> None:
+    evaluate = add_command(
+        commands, "evaluate", "evaluate", "Error of a trajectory against ground truth, by the evo package.",
+        "Files hold TUM rows `timestamp tx ty tz qx qy qz qw` or KITTI rows of 12 numbers.\n\nexamples:\n"
+        "  procman/tessera evaluate logs/mh01\n"
+        "  procman/tessera evaluate trajectory_kitti.txt data/kitti/poses/03.txt --align sim3\n")
+    evaluate.add_argument("estimate", metavar="RUN|TRAJECTORY", help="a run's folder, or a trajectory file")
+    evaluate.add_argument("truth", metavar="GROUND_TRUTH", nargs="?", help="default: the run's own ground_truth.txt")
+    evaluate.add_argument("--align", choices=("sim3", "se3"),
+                          help="default: se3 for a stereo or RGB-D run, sim3 (with scale) otherwise")
+    experiment = add_command(commands, "experiment", "experiment", "Measurements, as a table, a CSV file and a plot under logs/.",
+                             "examples:\n  procman/tessera experiment extraction\n")
+    experiment.add_argument("name", metavar="NAME", choices=("extraction",), help="extraction: time per image against cv::ORB")
+    spy = add_command(commands, "spy", "spy", "lcm-spy with Tessera's message types.",
+                      "examples:\n  procman/tessera spy --bus camera\n")
+    spy.add_argument("--bus", choices=("main", "camera", "work"), default="main", help="default main")
+    add_port(spy)
+
+
+def parse_arguments(arguments: list[str]) -> argparse.Namespace:
+    parser = Parser(prog="procman/tessera", description="A distributed visual SLAM stack over LCM.", allow_abbrev=False)
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
+    add_run_commands(commands)
+    add_look_commands(commands)
+    return parser.parse_args(arguments)

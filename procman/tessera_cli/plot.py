@@ -1,0 +1,64 @@
+"""trajectory.png: the estimate over the truth, seen from above, and the error along the way."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tessera_cli.files import unfinished
+from tessera_cli.trajectories import Trajectory, TrajectoryError
+
+AXES = "xyz"
+
+
+def widest_axes(positions: np.ndarray) -> tuple[int, int]:
+    """The two axes along which the path extends most: the view from above, however the world is turned."""
+    extent = np.ptp(positions, axis=0)
+    first, second = sorted(np.argsort(-extent, kind="stable")[:2])
+    return int(first), int(second)
+
+
+def draw_path(axes, positions: np.ndarray, across: int, along: int, unit: str) -> None:
+    axes.plot(positions[:1, across], positions[:1, along], "o", color="black", markersize=5, label="start")
+    axes.set_xlabel(f"{AXES[across]} [{unit}]")
+    axes.set_ylabel(f"{AXES[along]} [{unit}]")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def save(figure: Figure, path: Path) -> None:
+    figure.savefig(unfinished(path), dpi=120)
+    os.replace(unfinished(path), path)
+
+
+def plot_error(error: TrajectoryError, title: str, path: Path) -> None:
+    figure = Figure(figsize=(13, 6), layout="constrained")
+    from_above, along_way = figure.subplots(1, 2)
+    across, along = widest_axes(error.truth)
+    from_above.plot(error.truth[:, across], error.truth[:, along], color="0.6", linewidth=3, label="ground truth")
+    from_above.plot(error.estimate[:, across], error.estimate[:, along], color="tab:blue", linewidth=1.2,
+                    label=f"estimate, {error.alignment} aligned")
+    draw_path(from_above, error.truth, across, along, "m")
+    seconds = error.timestamps_s - error.timestamps_s[0]
+    along_way.plot(seconds, error.errors_m, color="tab:red", linewidth=1)
+    along_way.axhline(error.rms_m, color="black", linestyle="--", linewidth=1, label=f"RMS {error.rms_m:.3f} m")
+    along_way.set_xlabel("time [s]")
+    along_way.set_ylabel("position error [m]")
+    along_way.set_ylim(bottom=0)
+    along_way.grid(alpha=0.3)
+    along_way.legend()
+    figure.suptitle(title)
+    save(figure, path)
+
+
+def plot_estimate(estimate: Trajectory, title: str, unit: str, path: Path) -> None:
+    """For a source without ground truth."""
+    figure = Figure(figsize=(7, 6), layout="constrained")
+    axes = figure.subplots()
+    across, along = widest_axes(estimate.positions)
+    axes.plot(estimate.positions[:, across], estimate.positions[:, along], color="tab:blue", linewidth=1.2, label="estimate")
+    draw_path(axes, estimate.positions, across, along, unit)
+    figure.suptitle(title)
+    save(figure, path)

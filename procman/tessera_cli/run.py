@@ -1,0 +1,182 @@
+"""tessera run and replay: starts the stack, watches it to the end of the source, and writes the summary."""
+
+import datetime
+import signal
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from tessera_cli import settings
+from tessera_cli.bus import BusListener
+from tessera_cli.errors import RunFailed, UserError
+from tessera_cli.files import ROOT
+from tessera_cli.panel import make_view
+from tessera_cli.progress import RUNNING
+from tessera_cli.sources import Source, parse_source
+from tessera_cli.stack import Stack
+
+# A process that has not said by then that it runs never will; LCM's own self-test may take 10 s.
+START_TIMEOUT_S = 20.0
+# A stored source without a new pose for this long is stuck; repairs and late tiles take a few seconds.
+STALL_TIMEOUT_S = 60.0
+# After Ctrl-C the frames on their way get this long to be tracked.
+DRAIN_TIMEOUT_S = 3.0
+LISTEN_MS = 50
+# What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
+RUN_FILES = ("summary.json", "run.json", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
+             "keyframes.txt", "ground_truth.txt", "frames.csv", "run.lcmlog", "settings.yaml")
+
+
+class Interrupt:
+    """Ctrl-C and SIGTERM end the run in order; a second one at once."""
+
+    def __init__(self):
+        self.requested = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, _number, _frame) -> None:
+        if self.requested:
+            raise KeyboardInterrupt
+        self.requested = True
+
+
+def main(arguments: Namespace) -> int:
+    source = parse_source(arguments.source_prefix + arguments.source)
+    folder = _make_folder(arguments.out, source)
+    values = settings.write_settings(settings.run_assignments(arguments, source, folder), folder / "settings.yaml")
+    return Launcher(arguments, source, folder, values).run()
+
+
+def _make_folder(out: str | None, source: Source) -> Path:
+    now = datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
+    folder = Path(out).expanduser().absolute() if out else ROOT / "logs" / f"{now}-{source.name}"
+    try:
+        (folder / "stages").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"the run's folder {folder} can't be made: {error.strerror}.") from error
+    for name in RUN_FILES:
+        (folder / name).unlink(missing_ok=True)
+    for log in (folder / "stages").glob("*.log"):
+        log.unlink()
+    return folder
+
+
+class Launcher:
+    def __init__(self, arguments: Namespace, source: Source, folder: Path, values: dict):
+        self._arguments = arguments
+        self._source = source
+        self._folder = folder
+        self._stack = Stack(folder / "settings.yaml", folder / "stages")
+        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], self._stack.owns)
+        self._interrupt = Interrupt()
+        self._num_warnings_said = 0
+
+    def run(self) -> int:
+        """The exit status. All processes have ended when it returns or raises."""
+        title = f"{self._source.name}, {self._arguments.sensor}, {self._arguments.extractors} extractors, {self._arguments.tiles} tiles"
+        ended = "complete"
+        began = time.monotonic()
+        try:
+            with make_view(title) as view:
+                self._start(view)
+                began = time.monotonic()
+                ended = self._watch(view)
+                wall_s = time.monotonic() - began
+                self._stack.stop()
+        except RunFailed as failure:
+            self._stack.stop()
+            self._try_to_summarize(time.monotonic() - began, str(failure))
+            raise
+        finally:
+            self._stack.kill()
+        self._print_summary(wall_s, ended)
+        return 0 if ended == "complete" or self._source.is_live else 1
+
+    def _start(self, view) -> None:
+        """The camera comes last: nobody misses its first frame."""
+        for stage in ("evaluator", "tracker", "reassembler", "dispatcher"):
+            self._stack.start(stage)
+        for instance in range(self._arguments.extractors):
+            self._stack.start("extractor", instance)
+        if self._arguments.record:
+            self._stack.start("recorder")
+        self._wait_until_running(view)
+        if self._source.has_camera_process and not self._interrupt.requested:
+            self._stack.start("camera")
+        elif not self._source.has_camera_process:
+            view.say("waiting for frames on the bus; Ctrl-C ends the run")
+
+    def _wait_until_running(self, view) -> None:
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while waiting := self._not_yet_running():
+            if self._interrupt.requested:
+                return
+            if time.monotonic() > deadline:
+                raise RunFailed(f"{', '.join(waiting)} did not say within {START_TIMEOUT_S:.0f} s that it runs; "
+                                f"its log is in {self._folder / 'stages'}.")
+            self._look(view)
+
+    def _not_yet_running(self) -> list[str]:
+        stages = self._bus.progress.stages
+        return [name for name in self._stack.processes if name not in stages or stages[name].state < RUNNING]
+
+    def _watch(self, view) -> str:
+        """Until the evaluator has everything. Returns how the run ended: "complete" or "interrupted"."""
+        progress = self._bus.progress
+        while not progress.is_finished:
+            self._look(view)
+            view.update(progress)
+            if self._interrupt.requested:
+                return self._drain(view)
+            self._check_stall()
+        return "complete"
+
+    def _drain(self, view) -> str:
+        """Ends the source and lets the frames on their way arrive."""
+        view.say("ending the run")
+        if "camera" in self._stack.processes:
+            self._stack.end_source()
+        deadline = time.monotonic() + DRAIN_TIMEOUT_S
+        while not self._bus.progress.is_finished and time.monotonic() < deadline:
+            self._look(view)
+        return "interrupted"
+
+    def _look(self, view) -> None:
+        self._bus.listen(LISTEN_MS)
+        self._stack.check()
+        if foreign := self._bus.foreign:
+            raise UserError(f"another stack runs on this bus ({foreign.name}, process {foreign.pid}): end it, or give --port N "
+                            "to keep the two apart.")
+        for warning in self._stack.warnings[self._num_warnings_said:]:
+            view.say(warning)
+        self._num_warnings_said = len(self._stack.warnings)
+
+    def _check_stall(self) -> None:
+        progress = self._bus.progress
+        since = max(progress.last_pose_at or 0.0, progress.started_at)
+        if self._source.is_live or time.monotonic() - since < STALL_TIMEOUT_S:
+            return
+        errors = [f"{report.name}: {report.last_error}" for report in progress.stages.values() if report.last_error]
+        raise RunFailed(f"no pose for {STALL_TIMEOUT_S:.0f} s after {progress.num_poses} frames; "
+                        + (errors[-1] if errors else f"the logs are in {self._folder / 'stages'}."))
+
+    def _summarize(self, wall_s: float, ended: str) -> dict:
+        from tessera_cli.summary import RunFacts, summarize
+
+        undecodable = sum(report.undecodable for report in self._bus.progress.stages.values())
+        facts = RunFacts(source=self._source.text or "bus:", sensor=self._arguments.sensor, extractors=self._arguments.extractors,
+                         tiles=self._arguments.tiles, wall_s=wall_s, ended=ended, messages_undecodable=undecodable)
+        return summarize(self._folder, facts, self._stack)
+
+    def _print_summary(self, wall_s: float, ended: str) -> None:
+        from tessera_cli.summary import in_words
+
+        print(in_words(self._summarize(wall_s, ended), self._folder))
+
+    def _try_to_summarize(self, wall_s: float, sentence: str) -> None:
+        """After a failure: what there is, if there is anything."""
+        try:
+            self._summarize(wall_s, sentence)
+        except RunFailed:
+            pass

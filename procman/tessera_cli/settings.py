@@ -1,0 +1,74 @@
+"""The settings of one run: defaults, what the options say, and --set on top, checked and merged by tessera-settings."""
+
+import subprocess
+from argparse import Namespace
+from pathlib import Path
+
+import yaml
+
+from tessera_cli.errors import UserError
+from tessera_cli.files import BIN, ROOT
+from tessera_cli.sources import Source
+
+GROUP = "239.255.76.67"
+FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
+# Keys that the command itself fills in.
+RESERVED = {"evaluator.out_dir": "--out DIR", "camera.source": "SOURCE"}
+
+
+def bus_url(port: int) -> str:
+    """Multicast that stays on this machine."""
+    return f"udpm://{GROUP}:{port}?ttl=0"
+
+
+def bus_assignments(source: Source, port: int) -> list[str]:
+    main = bus_url(port)
+    camera = bus_url(port + 1)
+    if source.kind == "bus":
+        # A log player publishes all channels of its log on one bus.
+        main = camera = source.text or main
+    return [f"bus.main_url={main}", f"bus.camera_url={camera}", f"bus.work_url={bus_url(port + 2)}",
+            f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}"]
+
+
+def source_assignments(arguments: Namespace, source: Source) -> list[str]:
+    first, last = arguments.frames
+    assignments = [f"camera.sensor={arguments.sensor}", f"camera.first_frame={first}", f"camera.last_frame={last}"]
+    if source.has_camera_process:
+        assignments.append(f"camera.source={source.text}")
+    if arguments.camera:
+        path = Path(arguments.camera).expanduser().absolute()
+        if not path.is_file():
+            raise UserError(f"--camera {arguments.camera}: there is no file {path}.")
+        assignments.append(f"camera.calibration={path}")
+    return assignments
+
+
+def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list[str]:
+    pace = arguments.pace or ("realtime" if source.is_live else "lockstep")
+    if source.kind == "bus" and arguments.frames != (0, -1):
+        raise UserError("--frames has no effect on bus:, whose frames another program sends.")
+    assignments = source_assignments(arguments, source) + bus_assignments(source, arguments.port)
+    assignments += [f"camera.pace={pace}", f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
+    if arguments.features:
+        assignments.append(f"features.num_features={arguments.features}")
+    return assignments + user_assignments(arguments)
+
+
+def user_assignments(arguments: Namespace) -> list[str]:
+    for text in arguments.settings:
+        key = text.partition("=")[0]
+        if key in RESERVED:
+            raise UserError(f"--set {text}: give {RESERVED[key]} instead.")
+    return arguments.settings
+
+
+def write_settings(assignments: list[str], path: Path) -> dict:
+    """Writes all settings to `path` and returns them as sections of keys."""
+    command = [BIN / "tessera-settings", "--defaults", ROOT / "config" / "default.yaml", "--out", path]
+    for assignment in assignments:
+        command += ["--set", assignment]
+    merged = subprocess.run(command, capture_output=True, text=True)
+    if merged.returncode != 0:
+        raise UserError(merged.stderr.strip())
+    return yaml.safe_load(path.read_text())

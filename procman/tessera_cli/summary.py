@@ -1,0 +1,114 @@
+"""summary.json and trajectory.png of a run, from what the evaluator wrote and the kernel accounted."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from tessera_cli.errors import RunFailed, UserError
+from tessera_cli.files import write_text
+from tessera_cli.stack import Stack
+from tessera_cli.trajectories import TrajectoryError, absolute_error, read_trajectory
+
+# What the evaluator's run.json hands over as it is.
+EVALUATOR_KEYS = ("frames", "frames_tracked", "frames_lost", "frames_initializing", "frames_dropped", "tracking_failures",
+                  "keyframes", "landmarks", "pose_time_ms", "latency_ms", "stage_ms", "messages_repaired", "messages_lost",
+                  "trajectory_sha256", "map_sha256")
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """What the launcher alone knows."""
+
+    source: str
+    sensor: str
+    extractors: int
+    tiles: str
+    wall_s: float  # from the camera's start to the end of the stream
+    ended: str  # "complete", "interrupted", or the sentence of a failure
+    messages_undecodable: int
+
+
+def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
+    """Writes summary.json and trajectory.png, and returns the summary. Raises RunFailed if the evaluator wrote nothing."""
+    evaluated = _read_evaluation(folder)
+    error, alignment = _measure_error(folder, facts.sensor)
+    summary = {"source": facts.source, "sensor": facts.sensor, "extractors": facts.extractors, "tiles": facts.tiles,
+               "ended": facts.ended}
+    summary.update({key: evaluated.get(key) for key in EVALUATOR_KEYS})
+    summary.update(
+        relocalizations=None, loops_closed=None,  # no stage of today does either
+        rms_error_m=error.rms_m if error else None,
+        alignment=alignment,
+        wall_s=round(facts.wall_s, 3),
+        frames_per_s=round(evaluated["frames"] / facts.wall_s, 3) if facts.wall_s > 0 else None,
+        cpu_s={name: round(process.cpu_s, 3) for name, process in stack.processes.items()},
+        max_rss_mb={name: round(process.max_rss_mb, 1) for name, process in stack.processes.items()},
+        messages_undecodable=facts.messages_undecodable,
+        extractor_restarts=stack.num_extractor_restarts,
+        warnings=stack.warnings,
+    )
+    _plot(folder, summary, error)
+    write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
+    return summary
+
+
+def _read_evaluation(folder: Path) -> dict:
+    try:
+        return json.loads((folder / "run.json").read_text())
+    except (OSError, ValueError) as error:
+        raise RunFailed(f"the evaluator left no results in {folder}; {folder / 'stages' / 'evaluator.log'} may say why.") from error
+
+
+def _measure_error(folder: Path, sensor: str) -> tuple[TrajectoryError | None, str]:
+    """The error, or None, and the alignment in words."""
+    if not _has_poses(folder / "ground_truth.txt"):
+        return None, "none: the source has no ground truth"
+    if not _has_poses(folder / "trajectory.txt"):
+        return None, "none: no frame was tracked"
+    try:
+        error = absolute_error(read_trajectory(folder / "trajectory.txt"), read_trajectory(folder / "ground_truth.txt"),
+                               with_scale=sensor == "mono")
+    except UserError as problem:
+        return None, f"none: {problem}"
+    return error, f"{error.alignment} over {len(error.errors_m)} frames, scale {error.scale:.6g}"
+
+
+def _has_poses(path: Path) -> bool:
+    return path.is_file() and any(line.strip() and not line.startswith("#") for line in path.read_text().splitlines())
+
+
+def _plot(folder: Path, summary: dict, error: TrajectoryError | None) -> None:
+    from tessera_cli import plot
+
+    title = f"{summary['source']}, {summary['sensor']}: {summary['frames_tracked']} of {summary['frames']} frames tracked"
+    if error:
+        plot.plot_error(error, title, folder / "trajectory.png")
+    elif _has_poses(folder / "trajectory.txt"):
+        unit = "map units" if summary["sensor"] == "mono" else "m"
+        plot.plot_estimate(read_trajectory(folder / "trajectory.txt"), title, unit, folder / "trajectory.png")
+
+
+def in_words(summary: dict, folder: Path) -> str:
+    """The result for people, a few lines."""
+    lines = [
+        f"{summary['frames']} frames in {summary['wall_s']:.1f} s ({summary['frames_per_s'] or 0:.1f}/s): "
+        f"{summary['frames_tracked']} tracked, {summary['frames_initializing']} before the start of the map, "
+        f"{summary['frames_lost']} lost, {summary['frames_dropped']} dropped",
+        f"map: {summary['keyframes']} keyframes, {summary['landmarks']} landmarks",
+    ]
+    if summary["rms_error_m"] is not None:
+        lines.append(f"RMS error {summary['rms_error_m']:.3f} m after alignment by {summary['alignment']}")
+    else:
+        lines.append(f"error: {summary['alignment']}")
+    lines.append(f"{_statistics('pose time', summary['pose_time_ms'])}; {_statistics('latency', summary['latency_ms'])}")
+    lines.append(f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
+                 f"{summary['messages_undecodable']} undecodable; extractors started again: {summary['extractor_restarts']}")
+    lines += [f"warning: {warning}" for warning in summary["warnings"]]
+    lines.append(f"all of it: {folder}")
+    return "\n".join(lines)
+
+
+def _statistics(name: str, milliseconds: dict | None) -> str:
+    if not milliseconds:
+        return f"{name}: not measured"
+    return f"{name}: median {milliseconds['median']:.1f} ms, 95 % {milliseconds['p95']:.1f} ms"
