@@ -1,0 +1,81 @@
+"""The layers of modules/: includes point down only, stages don't know each other, and transport alone sees LCM."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+MODULES = Path(__file__).resolve().parents[1] / "modules"
+INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]', re.MULTILINE)
+LCM_HEADER = re.compile(r"^(lcm/|tessera/\w+_t\.hpp$|tessera/type_texts\.h$)")
+
+
+def layers() -> list[str]:
+    """Bottom to top, from the list that the build itself follows."""
+    text = (MODULES / "CMakeLists.txt").read_text()
+    return re.search(r"foreach\(module ([a-z_ \n]+)\)", text)[1].split()
+
+
+def sources() -> list[Path]:
+    return sorted(path for path in MODULES.rglob("*") if path.suffix in (".h", ".cc"))
+
+
+def includes(path: Path) -> list[tuple[str, str]]:
+    """(quote or bracket, header) of every include."""
+    return INCLUDE.findall(path.read_text())
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(MODULES).parts[0]
+
+
+def stage_of(path: str) -> str | None:
+    parts = Path(path).parts
+    return parts[1] if len(parts) > 2 and parts[0] == "stages" else None
+
+
+def test_every_folder_is_a_layer():
+    folders = {layer_of(path) for path in sources()}
+    assert folders, "modules/ holds no sources"
+    assert folders <= set(layers())
+
+
+def test_includes_point_down():
+    order = {layer: height for height, layer in enumerate(layers())}
+    wrong = []
+    for path in sources():
+        for quote, header in includes(path):
+            layer = header.split("/")[0]
+            if quote == '"' and layer not in order:
+                wrong.append(f"{path.relative_to(MODULES)}: \"{header}\" names no layer; write the path from modules/")
+            elif quote == '"' and order[layer] > order[layer_of(path)]:
+                wrong.append(f"{path.relative_to(MODULES)} includes \"{header}\", which is above it")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_stage_includes_another():
+    wrong = [f"{path.relative_to(MODULES)} includes \"{header}\""
+             for path in sources() for _, header in includes(path)
+             if stage_of(header) and stage_of(header) != stage_of(str(path.relative_to(MODULES)))]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_transport_alone_sees_lcm():
+    wrong = [f"{path.relative_to(MODULES)} includes \"{header}\""
+             for path in sources() for _, header in includes(path)
+             if LCM_HEADER.match(header) and layer_of(path) != "transport"]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_pure_modules_have_no_clock_and_no_threads():
+    """Logical time only: below transport nothing reads a clock or starts a thread."""
+    forbidden = {"chrono", "ctime", "time.h", "sys/time.h", "thread", "mutex", "atomic", "future", "random"}
+    wrong = [f"{path.relative_to(MODULES)} includes <{header}>"
+             for path in sources() if layer_of(path) not in ("transport", "stages")
+             for _, header in includes(path) if header in forbidden]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("line, header", [('#include "a/b.h"', "a/b.h"), ("  #  include <lcm/lcm.h>", "lcm/lcm.h")])
+def test_includes_are_recognised(line, header):
+    assert INCLUDE.findall(line)[0][1] == header
