@@ -1,0 +1,143 @@
+#include "geometry/absolute_pose.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <random>
+
+#include "geometry/reprojection.h"
+#include "geometry/sampling.h"
+
+namespace tessera {
+namespace {
+
+// Real roots of c[4] x^4 + ... + c[0], as eigenvalues of the companion matrix, each polished by Newton's method.
+std::vector<double> RealRoots(const std::array<double, 5>& c) {
+  if (!(std::abs(c[4]) > 1e-14)) {
+    return {};
+  }
+  Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
+  companion.block<3, 3>(1, 0).setIdentity();
+  companion.col(3) << -c[0] / c[4], -c[1] / c[4], -c[2] / c[4], -c[3] / c[4];
+  if (!companion.allFinite()) {
+    return {};
+  }
+  const Eigen::EigenSolver<Eigen::Matrix4d> solver(companion, false);
+  std::vector<double> roots;
+  for (int i = 0; i < 4; ++i) {
+    double x = solver.eigenvalues()(i).real();
+    if (std::abs(solver.eigenvalues()(i).imag()) > 1e-3 * (1.0 + std::abs(x))) {
+      continue;
+    }
+    for (int step = 0; step < 3; ++step) {
+      const double value = (((c[4] * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0];
+      const double slope = ((4.0 * c[4] * x + 3.0 * c[3]) * x + 2.0 * c[2]) * x + c[1];
+      x -= std::abs(slope) > 1e-12 ? value / slope : 0.0;
+    }
+    roots.push_back(x);
+  }
+  return roots;
+}
+
+// Orthonormal frame of three points: x along the first side, z across both. nullopt if they lie on a line.
+std::optional<Eigen::Matrix3d> FrameOf(const std::array<Eigen::Vector3d, 3>& points) {
+  const Eigen::Vector3d side = points[1] - points[0];
+  const Eigen::Vector3d across = side.cross(points[2] - points[0]);
+  if (!(across.norm() > 1e-9 * side.squaredNorm())) {
+    return std::nullopt;
+  }
+  Eigen::Matrix3d frame;
+  frame.col(0) = side.normalized();
+  frame.col(2) = across.normalized();
+  frame.col(1) = frame.col(2).cross(frame.col(0));
+  return frame;
+}
+
+// Coefficients of Grunert's quartic in v = s3/s1, where s_i is the distance of point i, a, b, c are the sides opposite
+// to points 1, 2, 3, and the cosines are of the angles between rays (2,3), (1,3), (1,2). p = (a^2 - c^2)/b^2 and so on.
+std::array<double, 5> GrunertQuartic(double a2, double b2, double c2, double cos_a, double cos_b, double cos_c) {
+  const double p = (a2 - c2) / b2, q = (a2 + c2) / b2, r = (b2 - c2) / b2, s = (b2 - a2) / b2;
+  const double a = a2 / b2, c = c2 / b2;
+  return {(1.0 + p) * (1.0 + p) - 4.0 * a * cos_c * cos_c,
+          4.0 * (-p * (1.0 + p) * cos_b + 2.0 * a * cos_c * cos_c * cos_b - (1.0 - q) * cos_a * cos_c),
+          2.0 * (p * p - 1.0 + 2.0 * p * p * cos_b * cos_b + 2.0 * r * cos_a * cos_a -
+                 4.0 * q * cos_a * cos_b * cos_c + 2.0 * s * cos_c * cos_c),
+          4.0 * (p * (1.0 - p) * cos_b - (1.0 - q) * cos_a * cos_c + 2.0 * c * cos_a * cos_a * cos_b),
+          (p - 1.0) * (p - 1.0) - 4.0 * c * cos_a * cos_a};
+}
+
+int CountInliers(const CameraCalibration& calibration, std::span<const PointPixel> points, const Rigid3& pose,
+                 std::vector<char>& is_inlier) {
+  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
+  int num_inliers = 0;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d in_camera = rotation * points[i].point_in_world + pose.translation;
+    const bool fits = in_camera.z() > 0.0 &&
+                      (calibration.Project(in_camera) - points[i].pixel_px).squaredNorm() <=
+                          Chi2Limit(false) * points[i].sigma_px * points[i].sigma_px;
+    is_inlier[i] = fits ? 1 : 0;
+    num_inliers += fits ? 1 : 0;
+  }
+  return num_inliers;
+}
+
+}  // namespace
+
+std::vector<Rigid3> PosesFromThreePoints(const std::array<Eigen::Vector3d, 3>& points_in_world,
+                                         const std::array<Eigen::Vector3d, 3>& rays_in_camera) {
+  const std::optional<Eigen::Matrix3d> world_frame = FrameOf(points_in_world);
+  if (!world_frame) {
+    return {};
+  }
+  const Eigen::Vector3d r1 = rays_in_camera[0].normalized(), r2 = rays_in_camera[1].normalized(),
+                        r3 = rays_in_camera[2].normalized();
+  const double a2 = (points_in_world[1] - points_in_world[2]).squaredNorm();
+  const double b2 = (points_in_world[0] - points_in_world[2]).squaredNorm();
+  const double c2 = (points_in_world[0] - points_in_world[1]).squaredNorm();
+  const double cos_a = r2.dot(r3), cos_b = r1.dot(r3), cos_c = r1.dot(r2);
+  const double p = (a2 - c2) / b2;
+  std::vector<Rigid3> poses;
+  for (const double v : RealRoots(GrunertQuartic(a2, b2, c2, cos_a, cos_b, cos_c))) {
+    const double divisor = 2.0 * (cos_c - v * cos_a);
+    const double u = ((-1.0 + p) * v * v - 2.0 * p * cos_b * v + 1.0 + p) / divisor;
+    const double s1_squared = b2 / (1.0 + v * v - 2.0 * v * cos_b);
+    if (!(std::abs(divisor) > 1e-12) || !(u > 0.0) || !(v > 0.0) || !(s1_squared > 0.0)) {
+      continue;
+    }
+    const double s1 = std::sqrt(s1_squared);
+    const std::array<Eigen::Vector3d, 3> in_camera = {s1 * r1, u * s1 * r2, v * s1 * r3};
+    const std::optional<Eigen::Matrix3d> camera_frame = FrameOf(in_camera);
+    if (camera_frame) {
+      const Eigen::Matrix3d rotation = *camera_frame * world_frame->transpose();
+      poses.push_back(Rigid3::FromMatrix(rotation, in_camera[0] - rotation * points_in_world[0]));
+    }
+  }
+  return poses;
+}
+
+std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibration,
+                                                 std::span<const PointPixel> points, uint64_t seed,
+                                                 const AbsolutePoseOptions& options) {
+  if (points.size() < static_cast<size_t>(std::max(3, options.min_inliers))) {
+    return std::nullopt;
+  }
+  std::mt19937_64 generator(seed);
+  AbsolutePose best;
+  std::vector<char> is_inlier(points.size());
+  for (int iteration = 0; iteration < options.ransac_iterations; ++iteration) {
+    const auto sample = SampleDistinct<3>(generator, points.size());
+    std::array<Eigen::Vector3d, 3> in_world, rays;
+    for (size_t k = 0; k < 3; ++k) {
+      in_world[k] = points[sample[k]].point_in_world;
+      rays[k] = calibration.Ray(points[sample[k]].pixel_px);
+    }
+    for (const Rigid3& pose : PosesFromThreePoints(in_world, rays)) {
+      const int num_inliers = CountInliers(calibration, points, pose, is_inlier);
+      if (num_inliers > best.num_inliers) {
+        best = {pose, is_inlier, num_inliers};
+      }
+    }
+  }
+  return best.num_inliers >= options.min_inliers ? std::optional(best) : std::nullopt;
+}
+
+}  // namespace tessera

@@ -1,0 +1,178 @@
+#include "geometry/epipolar.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <array>
+#include <cmath>
+
+#include "geometry/reprojection.h"
+
+namespace tessera {
+namespace {
+
+using Matrix9d = Eigen::Matrix<double, 9, 9>;
+using Vector9d = Eigen::Matrix<double, 9, 1>;
+
+// Unit vector that `normal` (symmetric) shrinks most, as a row-major 3x3 matrix. nullopt if a second vector is shrunk
+// as much: then the measurements don't fix the matrix.
+std::optional<Eigen::Matrix3d> NullMatrix(const Matrix9d& normal) {
+  const Eigen::SelfAdjointEigenSolver<Matrix9d> solver(normal);
+  const Vector9d& values = solver.eigenvalues();  // rising
+  if (solver.info() != Eigen::Success || !(values(1) > 1e-12 * values(8))) {
+    return std::nullopt;
+  }
+  const Vector9d v = solver.eigenvectors().col(0);
+  Eigen::Matrix3d m;
+  m << v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7), v(8);
+  return m;
+}
+
+// Two unit vectors that, with the unit vector v, form a right-handed orthonormal frame.
+Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
+  const Eigen::Vector3d axis = std::abs(v.x()) < 0.7 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = v.cross(axis).normalized();
+  basis.col(1) = v.cross(basis.col(0));
+  return basis;
+}
+
+// The motion one step of (rotation [rad], direction of translation [rad in its tangent plane]) away.
+Rigid3 StepMotion(const Rigid3& motion, const Eigen::Matrix<double, 3, 2>& basis,
+                  const Eigen::Matrix<double, 5, 1>& step) {
+  const Eigen::Vector3d t = motion.translation + basis * step.tail<2>();
+  return {(ExpSO3(step.head<3>()) * motion.rotation).normalized(), t.normalized()};
+}
+
+}  // namespace
+
+Eigen::Matrix3d EssentialFromMotion(const Rigid3& second_from_first) {
+  return Skew(second_from_first.translation) * second_from_first.rotation.toRotationMatrix();
+}
+
+std::optional<Eigen::Matrix3d> EssentialFromPairs(std::span<const RayPair> pairs) {
+  Matrix9d normal = Matrix9d::Zero();
+  for (const RayPair& pair : pairs) {
+    Vector9d row;  // second' E first = row . (E row by row)
+    row << pair.second.x() * pair.first, pair.second.y() * pair.first, pair.first;
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+  }
+  const std::optional<Eigen::Matrix3d> raw = NullMatrix(normal.selfadjointView<Eigen::Lower>());
+  if (!raw) {
+    return std::nullopt;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(*raw, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return Eigen::Matrix3d(svd.matrixU() * Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal() * svd.matrixV().transpose());
+}
+
+std::optional<Eigen::Matrix3d> HomographyFromPairs(std::span<const RayPair> pairs) {
+  Matrix9d normal = Matrix9d::Zero();
+  for (const RayPair& pair : pairs) {
+    Vector9d row;
+    row << pair.first, Eigen::Vector3d::Zero(), -pair.second.x() * pair.first;
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+    row << Eigen::Vector3d::Zero(), pair.first, -pair.second.y() * pair.first;
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+  }
+  const std::optional<Eigen::Matrix3d> homography = NullMatrix(normal.selfadjointView<Eigen::Lower>());
+  if (!homography || std::abs(homography->determinant()) < 1e-9) {
+    return std::nullopt;
+  }
+  return homography;
+}
+
+double SampsonDistance(const Eigen::Matrix3d& essential, const RayPair& pair) {
+  const Eigen::Vector3d line_in_second = essential * pair.first;
+  const Eigen::Vector3d line_in_first = essential.transpose() * pair.second;
+  const double scale_squared = line_in_second.head<2>().squaredNorm() + line_in_first.head<2>().squaredNorm();
+  return scale_squared > 0.0 ? pair.second.dot(line_in_second) / std::sqrt(scale_squared) : 0.0;
+}
+
+double TransferErrorSquared(const Eigen::Matrix3d& homography, const RayPair& pair) {
+  const Eigen::Vector3d moved = homography * pair.first;
+  return (moved.head<2>() / moved.z() - pair.second.head<2>()).squaredNorm();
+}
+
+std::vector<Rigid3> MotionsFromEssential(const Eigen::Matrix3d& essential) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d w;  // quarter turn about z
+  w << 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0;
+  const Eigen::Vector3d t = svd.matrixU().col(2);
+  std::vector<Rigid3> motions;
+  for (const Eigen::Matrix3d& turn : {w, Eigen::Matrix3d(w.transpose())}) {
+    Eigen::Matrix3d rotation = svd.matrixU() * turn * svd.matrixV().transpose();
+    rotation *= rotation.determinant() < 0.0 ? -1.0 : 1.0;
+    motions.push_back(Rigid3::FromMatrix(rotation, t));
+    motions.push_back(Rigid3::FromMatrix(rotation, -t));
+  }
+  return motions;
+}
+
+std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography) {
+  // H = R + t n'/d has 1 as its middle singular value. H'H = V diag(s1^2, 1, s3^2) V', s1 >= 1 >= s3.
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(homography, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = homography.determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Matrix3d h = sign / svd.singularValues()(1) * homography;
+  const double s1 = svd.singularValues()(0) / svd.singularValues()(1);
+  const double s3 = svd.singularValues()(2) / svd.singularValues()(1);
+  const double spread = s1 * s1 - s3 * s3;
+  if (!(spread > 1e-8)) {
+    return {};
+  }
+  // u is a direction that H keeps in length, besides v2: both span a plane through the origin that H maps rigidly.
+  const Eigen::Matrix3d v = svd.matrixV();
+  const double a = std::sqrt(std::max(0.0, 1.0 - s3 * s3)), b = std::sqrt(std::max(0.0, s1 * s1 - 1.0));
+  std::vector<Rigid3> motions;
+  for (const double side : {1.0, -1.0}) {
+    const Eigen::Vector3d u = (a * v.col(0) + side * b * v.col(2)) / std::sqrt(spread);
+    Eigen::Matrix3d from, to;
+    from << v.col(1), u, v.col(1).cross(u);
+    const Eigen::Vector3d h_v = h * v.col(1), h_u = h * u;
+    to << h_v, h_u, h_v.cross(h_u);
+    const Eigen::Matrix3d rotation = to * from.transpose();
+    const Eigen::Vector3d normal = from.col(2);
+    const Eigen::Vector3d t = ((h - rotation) * normal).normalized();
+    motions.push_back(Rigid3::FromMatrix(rotation, t));
+    motions.push_back(Rigid3::FromMatrix(rotation, -t));
+  }
+  return motions;
+}
+
+Rigid3 RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
+                    int max_iterations) {
+  constexpr double kStep = 1e-7;  // of the numeric derivative by the five parameters
+  using Vector5d = Eigen::Matrix<double, 5, 1>;
+  Rigid3 motion{second_from_first.rotation, second_from_first.translation.normalized()};
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(motion.translation);
+    const Eigen::Matrix3d essential = EssentialFromMotion(motion);
+    std::array<Eigen::Matrix3d, 5> moved;
+    for (int k = 0; k < 5; ++k) {
+      moved[static_cast<size_t>(k)] = EssentialFromMotion(StepMotion(motion, basis, kStep * Vector5d::Unit(k)));
+    }
+    Eigen::Matrix<double, 5, 5> information = Eigen::Matrix<double, 5, 5>::Zero();
+    Vector5d gradient = Vector5d::Zero();
+    for (const RayPair& pair : pairs) {
+      const double distance = SampsonDistance(essential, pair);
+      Vector5d by_step;
+      for (int k = 0; k < 5; ++k) {
+        by_step(k) = (SampsonDistance(moved[static_cast<size_t>(k)], pair) - distance) / kStep;
+      }
+      const double weight = HuberWeight(distance * distance, corner * corner);
+      information.noalias() += weight * by_step * by_step.transpose();
+      gradient += weight * distance * by_step;
+    }
+    const Vector5d step = information.ldlt().solve(-gradient);
+    if (!step.allFinite() || step.norm() > 1.0) {
+      break;
+    }
+    motion = StepMotion(motion, basis, step);
+    if (step.norm() < 1e-8) {
+      break;
+    }
+  }
+  return motion;
+}
+
+}  // namespace tessera

@@ -1,0 +1,45 @@
+// How a point in space and a camera pose give pixels, with derivatives: what pose, structure and test code share.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "geometry/camera.h"
+
+namespace tessera {
+
+// Where an image shows a point. A depth z is carried as the column that a right camera `baseline_m` away would see,
+// u_right = u - fx baseline / z: for a stereo pair that is what was measured, and for a structured-light RGB-D camera
+// the error of its depth grows with z^2 as that of a disparity does.
+struct PixelObservation {
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+  double right_x_px = -1.0;  // column in the right image; < 0: not seen there
+  double sigma_px = 1.0;     // standard deviation of each coordinate
+
+  bool has_right() const { return right_x_px >= 0.0; }
+};
+
+// r = (u, v, u_right)(point_in_camera) - observation, and dr/d(point_in_camera), both divided by sigma_px. The third
+// row is zero where the observation has no right column.
+struct Reprojection {
+  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
+};
+
+// `point_in_camera` must have z > 0; baseline_m > 0 where the observation has a right column.
+Reprojection Reproject(const CameraCalibration& calibration, double baseline_m,
+                       const Eigen::Vector3d& point_in_camera, const PixelObservation& observation);
+
+// The residual alone.
+Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, double baseline_m,
+                                     const Eigen::Vector3d& point_in_camera, const PixelObservation& observation);
+
+// 95 % of observations without a gross error have a squared residual below this (chi-square, 2 or 3 degrees of freedom).
+inline double Chi2Limit(bool has_right) { return has_right ? 7.815 : 5.991; }
+
+// Weight of a squared residual under Huber's loss with corner `corner_squared`: 1 below it, then falling like 1/|r|.
+double HuberWeight(double squared, double corner_squared);
+
+// [v]x, so that Skew(v) * w = v x w.
+Eigen::Matrix3d Skew(const Eigen::Vector3d& v);
+
+}  // namespace tessera

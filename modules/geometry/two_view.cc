@@ -1,0 +1,183 @@
+#include "geometry/two_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "geometry/epipolar.h"
+#include "geometry/reprojection.h"
+#include "geometry/sampling.h"
+#include "geometry/triangulation.h"
+
+namespace tessera {
+namespace {
+
+// What is the same for all candidate motions.
+struct Problem {
+  std::vector<RayPair> rays;
+  double limit_squared = 0.0;  // largest squared error of an inlier, one degree of freedom, in ray units
+  double corner = 0.0;         // its root
+  TwoViewOptions options;
+};
+
+struct Candidate {
+  Rigid3 second_from_first;
+  std::vector<std::optional<Eigen::Vector3d>> points;
+  int num_points = 0;
+};
+
+Problem MakeProblem(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
+                    const TwoViewOptions& options) {
+  Problem problem;
+  problem.options = options;
+  problem.corner = std::sqrt(3.841) * options.sigma_px / calibration.fx_px;  // 95 % of chi-square, 1 degree
+  problem.limit_squared = problem.corner * problem.corner;
+  problem.rays.reserve(pairs.size());
+  for (const PixelPair& pair : pairs) {
+    problem.rays.push_back({calibration.Ray(pair.first_px), calibration.Ray(pair.second_px)});
+  }
+  return problem;
+}
+
+// RANSAC with a truncated quadratic cost: `fit` makes a model of a sample, `error_squared` judges one pair.
+template <int kSampleSize, class Fit, class Error>
+std::optional<Eigen::Matrix3d> SampleModel(const Problem& problem, uint64_t seed, double limit_squared, Fit fit,
+                                           Error error_squared) {
+  std::mt19937_64 generator(seed);
+  std::optional<Eigen::Matrix3d> best;
+  double best_cost = std::numeric_limits<double>::infinity();
+  std::array<RayPair, kSampleSize> sample;
+  for (int iteration = 0; iteration < problem.options.ransac_iterations; ++iteration) {
+    const auto indices = SampleDistinct<kSampleSize>(generator, problem.rays.size());
+    std::transform(indices.begin(), indices.end(), sample.begin(), [&](size_t i) { return problem.rays[i]; });
+    const std::optional<Eigen::Matrix3d> model = fit(sample);
+    if (!model) {
+      continue;
+    }
+    double cost = 0.0;
+    for (const RayPair& pair : problem.rays) {
+      cost += std::min(error_squared(*model, pair), limit_squared);
+      if (cost >= best_cost) {
+        break;
+      }
+    }
+    if (cost < best_cost) {
+      best_cost = cost;
+      best = model;
+    }
+  }
+  return best;
+}
+
+// The point of a pair, if it lies in front of both cameras, projects near both pixels, and has enough parallax.
+std::optional<Eigen::Vector3d> GoodPoint(const Problem& problem, const Rigid3& motion, const RayPair& pair) {
+  const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
+  if (!point || point->z() <= 0.0) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d in_second = motion * *point;
+  if (in_second.z() <= 0.0) {
+    return std::nullopt;
+  }
+  const double error_first = (point->head<2>() / point->z() - pair.first.head<2>()).squaredNorm();
+  const double error_second = (in_second.head<2>() / in_second.z() - pair.second.head<2>()).squaredNorm();
+  const double limit = problem.limit_squared * 5.991 / 3.841;  // two degrees of freedom
+  const double cosine = CosParallax(*point, Eigen::Vector3d::Zero(), motion.Inverse().translation);
+  if (error_first > limit || error_second > limit || cosine > std::cos(problem.options.min_parallax_rad)) {
+    return std::nullopt;
+  }
+  return point;
+}
+
+// Refines the motion on the pairs that agree with it, twice, since better motion finds more of them.
+Rigid3 RefineOnInliers(const Problem& problem, Rigid3 motion) {
+  for (int round = 0; round < 2; ++round) {
+    const Eigen::Matrix3d essential = EssentialFromMotion(motion);
+    std::vector<RayPair> inliers;
+    for (const RayPair& pair : problem.rays) {
+      const double distance = SampsonDistance(essential, pair);
+      if (distance * distance <= 4.0 * problem.limit_squared) {
+        inliers.push_back(pair);
+      }
+    }
+    if (inliers.size() < 8) {
+      return motion;
+    }
+    motion = RefineMotion(inliers, motion, problem.corner);
+  }
+  return motion;
+}
+
+Candidate Evaluate(const Problem& problem, const Rigid3& motion) {
+  Candidate candidate{motion, {}, 0};
+  candidate.points.reserve(problem.rays.size());
+  for (const RayPair& pair : problem.rays) {
+    candidate.points.push_back(GoodPoint(problem, motion, pair));
+    candidate.num_points += candidate.points.back().has_value() ? 1 : 0;
+  }
+  return candidate;
+}
+
+std::vector<Rigid3> PossibleMotions(const Problem& problem, uint64_t seed) {
+  std::vector<Rigid3> motions;
+  const auto essential = SampleModel<8>(
+      problem, seed, problem.limit_squared, EssentialFromPairs, [](const Eigen::Matrix3d& e, const RayPair& pair) {
+        const double distance = SampsonDistance(e, pair);
+        return distance * distance;
+      });
+  if (essential) {
+    motions = MotionsFromEssential(*essential);
+  }
+  const auto homography = SampleModel<4>(problem, seed + 1, problem.limit_squared * 5.991 / 3.841,
+                                         HomographyFromPairs, TransferErrorSquared);
+  if (homography) {
+    const std::vector<Rigid3> more = MotionsFromHomography(*homography);
+    motions.insert(motions.end(), more.begin(), more.end());
+  }
+  return motions;
+}
+
+// Whether two motions differ by more than the noise of one: 3 degrees of rotation or 15 of direction.
+bool AreDifferent(const Rigid3& a, const Rigid3& b) {
+  return LogSO3(a.rotation.conjugate() * b.rotation).norm() > 0.05 || a.translation.dot(b.translation) < 0.966;
+}
+
+}  // namespace
+
+std::string TwoViewOptions::Check() const {
+  if (!(sigma_px > 0.0) || ransac_iterations < 1 || min_points < 8 || !(min_parallax_rad > 0.0) ||
+      !(max_rival_share > 0.0)) {
+    return "two-view options must be positive, and min_points at least 8";
+  }
+  return "";
+}
+
+std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
+                                             uint64_t seed, const TwoViewOptions& options) {
+  if (pairs.size() < static_cast<size_t>(options.min_points)) {
+    return std::nullopt;
+  }
+  const Problem problem = MakeProblem(calibration, pairs, options);
+  std::vector<Candidate> candidates;
+  for (const Rigid3& motion : PossibleMotions(problem, seed)) {
+    if (Evaluate(problem, motion).num_points * 4 >= options.min_points) {  // else refining cannot save it
+      candidates.push_back(Evaluate(problem, RefineOnInliers(problem, motion)));
+    }
+  }
+  const auto best = std::max_element(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+    return a.num_points < b.num_points;
+  });
+  if (best == candidates.end() || best->num_points < options.min_points) {
+    return std::nullopt;
+  }
+  for (const Candidate& rival : candidates) {
+    if (rival.num_points > options.max_rival_share * best->num_points &&
+        AreDifferent(rival.second_from_first, best->second_from_first)) {
+      return std::nullopt;
+    }
+  }
+  return TwoViewResult{best->second_from_first, best->points, best->num_points};
+}
+
+}  // namespace tessera

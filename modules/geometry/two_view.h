@@ -1,0 +1,45 @@
+// The first step of mono: camera motion and points from two images alone.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/camera.h"
+#include "geometry/rigid3.h"
+
+namespace tessera {
+
+struct PixelPair {
+  Eigen::Vector2d first_px;
+  Eigen::Vector2d second_px;
+};
+
+struct TwoViewOptions {
+  double sigma_px = 1.0;           // standard deviation of a keypoint coordinate
+  int ransac_iterations = 300;     // samples for each model: 8 good of 8 are met with 99 % at 60 % good matches
+  int min_points = 60;             // points with good parallax and small error that a start needs
+  double min_parallax_rad = 0.017; // 1 degree: a point's depth is then good to about sigma_px / (f * 0.017) ~ 10 %
+  double max_rival_share = 0.75;   // a different motion that explains more than this share of the points: ambiguous
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+struct TwoViewResult {
+  Rigid3 second_from_first;                                // |translation| = 1
+  std::vector<std::optional<Eigen::Vector3d>> points;      // by pair, in the first camera; nullopt: not a good point
+  int num_points = 0;
+};
+
+// Samples essential matrices (any scene) and homographies (a plane, where an essential matrix is not fixed by its
+// points), takes every motion that the best of each kind allows, refines each on all its inliers, and keeps the one
+// that puts most points in front of both cameras with small error and enough parallax. nullopt if that is fewer than
+// min_points, or if a clearly different motion does nearly as well. `seed` decides the samples.
+std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
+                                             uint64_t seed, const TwoViewOptions& options);
+
+}  // namespace tessera
