@@ -1,0 +1,157 @@
+#include "evaluation/run_files.h"
+
+#include <cinttypes>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/errors.h"
+#include "evaluation/pose_text.h"
+
+namespace tessera {
+namespace {
+
+// Keys keep the order in which they are written here.
+using Json = nlohmann::ordered_json;
+
+std::string TumText(const std::vector<StampedPose>& poses) {
+  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
+  for (const StampedPose& pose : poses) {
+    text += TumRow(pose.utime_us, pose.world_from_camera);
+  }
+  return text;
+}
+
+std::string KittiText(const std::vector<Rigid3>& poses) {
+  std::string text;
+  for (const Rigid3& pose : poses) {
+    text += KittiRow(pose);
+  }
+  return text;
+}
+
+const char* StateText(TrackingState state) {
+  switch (state) {
+    case TrackingState::kInitializing:
+      return "initializing";
+    case TrackingState::kTracked:
+      return "tracked";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "unknown";
+}
+
+std::string MillisecondsText(const std::optional<double>& milliseconds) {
+  char text[32] = "";
+  if (milliseconds) {
+    std::snprintf(text, sizeof text, "%.3f", *milliseconds);
+  }
+  return text;
+}
+
+Json ToJson(const std::optional<Statistics>& statistics) {
+  if (!statistics) {
+    return nullptr;
+  }
+  return {{"mean", statistics->mean},
+          {"median", statistics->median},
+          {"p95", statistics->p95},
+          {"p99", statistics->p99},
+          {"max", statistics->max}};
+}
+
+// The measurements of all frames that have them.
+std::optional<Statistics> SummarizeFrames(const std::vector<FrameRecord>& frames,
+                                          std::optional<double> FrameRecord::*measurement) {
+  std::vector<double> values;
+  for (const FrameRecord& frame : frames) {
+    if (const std::optional<double>& value = frame.*measurement) {
+      values.push_back(*value);
+    }
+  }
+  return Summarize(std::move(values));
+}
+
+}  // namespace
+
+void WriteFile(const std::string& path, const std::string& text) {
+  const std::string beside = path + ".part";
+  std::error_code error;
+  {
+    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
+    file << text;
+    file.close();
+    if (!file) {
+      std::filesystem::remove(beside, error);
+      throw InputError("file " + path + " can't be written: check the folder, its permissions and the space on the disk");
+    }
+  }
+  std::filesystem::rename(beside, path, error);
+  if (error) {
+    throw InputError("file " + path + " can't be written: " + error.message());
+  }
+}
+
+std::string FramesCsv(const RunRecord& record) {
+  std::string text =
+      "frame,utime_us,state,pose_time_ms,latency_ms,features,matches,inliers,landmarks,is_keyframe\n";
+  for (const FrameRecord& frame : record.Frames()) {
+    const PoseEstimate& pose = frame.pose;
+    char row[256];
+    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%d,%d,%d,%d,%d\n", pose.frame.value, pose.utime_us,
+                  StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
+                  MillisecondsText(frame.latency_ms).c_str(), pose.num_features, pose.num_matches, pose.num_inliers,
+                  pose.num_landmarks, pose.is_keyframe ? 1 : 0);
+    text += row;
+  }
+  return text;
+}
+
+std::string RunJson(const RunRecord& record) {
+  const FrameCounts counts = record.Counts();
+  const std::vector<FrameRecord> frames = record.Frames();
+  Json stage_ms = Json::object();
+  int64_t num_repaired = 0, num_lost = 0;
+  for (const auto& [name, figures] : record.stages()) {
+    if (figures.step_ms.count > 0) {
+      stage_ms[name] = ToJson(figures.step_ms);
+    }
+    num_repaired += figures.num_repaired;
+    num_lost += figures.num_lost;
+  }
+  const Json json = {{"frames", counts.frames},
+                     {"frames_tracked", counts.tracked},
+                     {"frames_lost", counts.lost},
+                     {"frames_initializing", counts.initializing},
+                     {"frames_dropped", counts.dropped},
+                     {"tracking_failures", counts.tracking_failures},
+                     {"keyframes", record.num_keyframes()},
+                     {"landmarks", record.num_landmarks()},
+                     {"pose_time_ms", ToJson(SummarizeFrames(frames, &FrameRecord::pose_time_ms))},
+                     {"latency_ms", ToJson(SummarizeFrames(frames, &FrameRecord::latency_ms))},
+                     {"stage_ms", stage_ms},
+                     {"messages_repaired", num_repaired},
+                     {"messages_lost", num_lost},
+                     {"trajectory_sha256", record.TrajectorySha256()},
+                     {"map_sha256", record.MapSha256()}};
+  return json.dump(2) + "\n";
+}
+
+void WriteRun(const RunRecord& record, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw InputError("folder " + folder + " can't be made: " + error.message());
+  }
+  WriteFile(folder + "/trajectory.txt", TumText(record.Trajectory()));
+  WriteFile(folder + "/trajectory_live.txt", TumText(record.LiveTrajectory()));
+  WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame()));
+  WriteFile(folder + "/keyframes.txt", TumText(record.Keyframes()));
+  WriteFile(folder + "/ground_truth.txt", TumText(record.GroundTruth()));
+  WriteFile(folder + "/frames.csv", FramesCsv(record));
+  WriteFile(folder + "/run.json", RunJson(record));  // last: whoever sees it finds all the others
+}
+
+}  // namespace tessera

@@ -1,0 +1,182 @@
+#include "evaluation/run_record.h"
+
+#include <algorithm>
+
+#include "core/sha256.h"
+
+namespace tessera {
+namespace {
+
+void AddPoseBits(const Rigid3& pose, Sha256& hash) {
+  for (const double number : {pose.translation.x(), pose.translation.y(), pose.translation.z(), pose.rotation.x(),
+                              pose.rotation.y(), pose.rotation.z(), pose.rotation.w()}) {
+    hash.Add(number);
+  }
+}
+
+std::string HashKeyframe(const KeyframeObservation& keyframe) {
+  Sha256 hash;
+  hash.Add(keyframe.id.value);
+  hash.Add(keyframe.features.frame.value);
+  AddPoseBits(keyframe.world_from_camera, hash);
+  hash.Add(static_cast<int64_t>(keyframe.features.keypoints.size()));
+  for (const Keypoint& keypoint : keyframe.features.keypoints) {
+    hash.Add(static_cast<double>(keypoint.x_px));
+    hash.Add(static_cast<double>(keypoint.y_px));
+  }
+  for (const LandmarkId landmark : keyframe.landmarks) {
+    hash.Add(landmark.value);
+  }
+  return hash.HexDigest();
+}
+
+}  // namespace
+
+void RunRecord::AddPose(const PoseEstimate& pose, int64_t publish_us) { poses_.try_emplace(pose.frame, pose, publish_us); }
+
+void RunRecord::AddKeyframe(const KeyframeObservation& keyframe) {
+  // The features themselves are not kept: a long run has more of them than memory.
+  if (!keyframes_.contains(keyframe.id)) {
+    const StampedPose pose{keyframe.features.frame, keyframe.features.utime_us, keyframe.world_from_camera};
+    keyframes_[keyframe.id] = {pose, HashKeyframe(keyframe)};
+  }
+}
+
+void RunRecord::AddGroundTruth(const GroundTruthPose& truth) {
+  truth_.try_emplace(truth.frame, truth.frame, truth.utime_us, truth.world_from_camera);
+}
+
+void RunRecord::SetStage(const std::string& name, const StageFigures& figures) { stages_[name] = figures; }
+
+void RunRecord::SetEnd(int64_t num_frames, int64_t num_dropped) {
+  end_num_frames_ = num_frames;
+  end_num_dropped_ = num_dropped;
+}
+
+std::vector<FrameRecord> RunRecord::Frames() const {
+  std::vector<FrameRecord> frames;
+  for (const auto& [id, pose] : poses_) {
+    FrameRecord frame{pose.estimate, pose.publish_us, std::nullopt, std::nullopt};
+    if (!frames.empty()) {
+      frame.pose_time_ms = 1e-3 * static_cast<double>(pose.publish_us - frames.back().publish_us);
+    }
+    if (pose.estimate.arrival_us > 0) {
+      frame.latency_ms = 1e-3 * static_cast<double>(pose.publish_us - pose.estimate.arrival_us);
+    }
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
+FrameCounts RunRecord::Counts() const {
+  FrameCounts counts;
+  TrackingState before = TrackingState::kInitializing;
+  for (const auto& [id, pose] : poses_) {
+    const TrackingState state = pose.estimate.state;
+    if (state == TrackingState::kTracked) {
+      ++counts.tracked;
+    } else if (counts.tracked == 0) {
+      ++counts.initializing;
+    } else {
+      ++counts.lost;
+    }
+    if (state == TrackingState::kLost && before == TrackingState::kTracked) {
+      ++counts.tracking_failures;
+    }
+    before = state;
+  }
+  if (end_num_dropped_) {
+    counts.dropped = *end_num_dropped_;
+  } else {
+    for (const auto& [name, figures] : stages_) {
+      counts.dropped += figures.num_dropped;
+    }
+  }
+  counts.frames = static_cast<int64_t>(poses_.size()) + counts.dropped;
+  return counts;
+}
+
+int64_t RunRecord::num_landmarks() const { return poses_.empty() ? 0 : poses_.rbegin()->second.estimate.num_landmarks; }
+
+StampedPose RunRecord::FinalPose(const PoseEstimate& estimate) const {
+  const auto reference = keyframes_.find(estimate.reference_keyframe);
+  const Rigid3 world_from_camera = reference == keyframes_.end()
+                                       ? estimate.world_from_camera
+                                       : reference->second.pose.world_from_camera * estimate.reference_from_camera;
+  return {estimate.frame, estimate.utime_us, world_from_camera};
+}
+
+std::vector<StampedPose> RunRecord::Trajectory() const {
+  std::vector<StampedPose> trajectory;
+  for (const auto& [id, pose] : poses_) {
+    if (pose.estimate.state == TrackingState::kTracked) {
+      trajectory.push_back(FinalPose(pose.estimate));
+    }
+  }
+  return trajectory;
+}
+
+std::vector<StampedPose> RunRecord::LiveTrajectory() const {
+  std::vector<StampedPose> trajectory;
+  for (const auto& [id, pose] : poses_) {
+    if (pose.estimate.state == TrackingState::kTracked) {
+      trajectory.push_back({id, pose.estimate.utime_us, pose.estimate.world_from_camera});
+    }
+  }
+  return trajectory;
+}
+
+std::vector<Rigid3> RunRecord::PosePerFrame() const {
+  if (poses_.empty()) {
+    return {};
+  }
+  // Frames are numbered without gaps up to the end, so that the number of frames tells the first one's number.
+  const int64_t end = std::max(end_num_frames_.value_or(0), poses_.rbegin()->first.value + 1);
+  const int64_t first = std::clamp<int64_t>(end - Counts().frames, 0, poses_.begin()->first.value);
+  std::vector<Rigid3> rows;
+  Rigid3 last;
+  for (int64_t frame = first; frame < end; ++frame) {
+    const auto pose = poses_.find(FrameId{frame});
+    if (pose != poses_.end() && pose->second.estimate.state == TrackingState::kTracked) {
+      last = FinalPose(pose->second.estimate).world_from_camera;
+    }
+    rows.push_back(last);
+  }
+  return rows;
+}
+
+std::vector<StampedPose> RunRecord::Keyframes() const {
+  std::vector<StampedPose> keyframes;
+  for (const auto& [id, keyframe] : keyframes_) {
+    keyframes.push_back(keyframe.pose);
+  }
+  return keyframes;
+}
+
+std::vector<StampedPose> RunRecord::GroundTruth() const {
+  std::vector<StampedPose> truth;
+  for (const auto& [frame, pose] : truth_) {
+    truth.push_back(pose);
+  }
+  return truth;
+}
+
+std::string RunRecord::TrajectorySha256() const {
+  Sha256 hash;
+  for (const StampedPose& pose : Trajectory()) {
+    hash.Add(pose.frame.value);
+    hash.Add(pose.utime_us);
+    AddPoseBits(pose.world_from_camera, hash);
+  }
+  return hash.HexDigest();
+}
+
+std::string RunRecord::MapSha256() const {
+  Sha256 hash;
+  for (const auto& [id, keyframe] : keyframes_) {
+    hash.Add(keyframe.sha256.data(), keyframe.sha256.size());
+  }
+  return hash.HexDigest();
+}
+
+}  // namespace tessera

@@ -1,0 +1,106 @@
+// What is known of a run: every pose, keyframe and true pose, and the figures of the stages. All that a run's folder
+// tells is derived from it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/ids.h"
+#include "evaluation/statistics.h"
+#include "geometry/camera_frame.h"
+#include "geometry/rigid3.h"
+#include "map/tracking_types.h"
+
+namespace tessera {
+
+struct StampedPose {
+  FrameId frame;
+  int64_t utime_us = 0;
+  Rigid3 world_from_camera;
+};
+
+// A frame of which a POSE came.
+struct FrameRecord {
+  PoseEstimate pose;
+  int64_t publish_us = 0;              // wall clock at which the pose was published
+  std::optional<double> pose_time_ms;  // since the pose before it was published; none for the first
+  std::optional<double> latency_ms;    // since the dispatcher first heard of the frame; none if that is unknown
+};
+
+struct FrameCounts {
+  int64_t frames = 0;         // of the source, as far as is known: those with a pose message, and the dropped ones
+  int64_t tracked = 0;
+  int64_t initializing = 0;   // without a pose, before the first that has one
+  int64_t lost = 0;           // without a pose, after it
+  int64_t dropped = 0;        // never reached the tracker
+  int64_t tracking_failures = 0;  // changes from tracked to lost
+};
+
+// What a stage said last of its own work.
+struct StageFigures {
+  Statistics step_ms;
+  int64_t num_repaired = 0;  // messages
+  int64_t num_lost = 0;      // messages
+  int64_t num_dropped = 0;   // frames
+};
+
+class RunRecord {
+ public:
+  // What comes twice counts once: the first.
+  void AddPose(const PoseEstimate& pose, int64_t publish_us);
+  void AddKeyframe(const KeyframeObservation& keyframe);
+  void AddGroundTruth(const GroundTruthPose& truth);
+  // The newest figures replace those before.
+  void SetStage(const std::string& name, const StageFigures& figures);
+  // The tracker has seen the end: one past the last frame's number, and how many frames never reached it.
+  void SetEnd(int64_t num_frames, int64_t num_dropped);
+
+  bool empty() const { return poses_.empty(); }
+  bool HasPose(FrameId frame) const { return poses_.contains(frame); }
+
+  // Frames in order of their numbers.
+  std::vector<FrameRecord> Frames() const;
+  FrameCounts Counts() const;
+  int64_t num_keyframes() const { return static_cast<int64_t>(keyframes_.size()); }
+  int64_t num_landmarks() const;  // in the map at the last frame
+  const std::map<std::string, StageFigures>& stages() const { return stages_; }
+
+  // Tracked frames, where the map puts them at the end:
+  //   world_from_camera = world_from_reference (now) * reference_from_camera (then)
+  std::vector<StampedPose> Trajectory() const;
+  // Tracked frames as they were published at the time.
+  std::vector<StampedPose> LiveTrajectory() const;
+  // One pose for every frame of the source: a frame without one takes the last before it; before the first, the
+  // origin of the world.
+  std::vector<Rigid3> PosePerFrame() const;
+  std::vector<StampedPose> Keyframes() const;
+  std::vector<StampedPose> GroundTruth() const;
+
+  // Over the exact bits of Trajectory(): frame, time, tx ty tz qx qy qz qw.
+  std::string TrajectorySha256() const;
+  // Over the keyframes: id, frame, pose, position of every keypoint, and the landmark it saw.
+  std::string MapSha256() const;
+
+ private:
+  struct Pose {
+    PoseEstimate estimate;
+    int64_t publish_us = 0;
+  };
+  struct Keyframe {
+    StampedPose pose;
+    std::string sha256;  // of all that the map's hash covers
+  };
+  StampedPose FinalPose(const PoseEstimate& estimate) const;
+
+  std::map<FrameId, Pose> poses_;
+  std::map<KeyframeId, Keyframe> keyframes_;
+  std::map<FrameId, StampedPose> truth_;
+  std::map<std::string, StageFigures> stages_;
+  std::optional<int64_t> end_num_frames_;
+  std::optional<int64_t> end_num_dropped_;
+};
+
+}  // namespace tessera

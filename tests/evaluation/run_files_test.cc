@@ -1,0 +1,160 @@
+#include "evaluation/run_files.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "core/errors.h"
+#include "evaluation/pose_text.h"
+
+namespace tessera {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RunFilesTest : public testing::Test {
+ protected:
+  RunFilesTest() {
+    std::string pattern = (fs::temp_directory_path() / "tessera-evaluation-XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~RunFilesTest() override { fs::remove_all(folder_); }
+
+  std::string Read(const std::string& name) const {
+    std::ifstream file(folder_ + "/" + name);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+
+  // Three frames: initializing, tracked and a keyframe, lost.
+  static RunRecord SmallRun() {
+    RunRecord record;
+    for (int i = 0; i < 3; ++i) {
+      PoseEstimate pose;
+      pose.frame = FrameId{i};
+      pose.utime_us = 1'403'636'584'763'555 + i;
+      pose.arrival_us = 1'000'000;
+      pose.state = static_cast<TrackingState>(i);
+      pose.world_from_camera.translation = {0.25 * i, -1.0, 2.0};
+      pose.num_features = 2000;
+      pose.num_matches = 50;
+      pose.num_inliers = 40;
+      pose.num_landmarks = 900;
+      pose.is_keyframe = i == 1;
+      record.AddPose(pose, 1'010'000 + 4'000 * i);
+      record.AddGroundTruth({pose.frame, pose.utime_us, {}});
+    }
+    KeyframeObservation keyframe;
+    keyframe.id = KeyframeId{0};
+    keyframe.features.frame = FrameId{1};
+    keyframe.features.utime_us = 1'403'636'584'763'556;
+    record.AddKeyframe(keyframe);
+    record.SetStage("tracker", {.step_ms = {3, 2.0, 1.5, 4.0, 5.0, 6.0}, .num_repaired = 2, .num_lost = 1});
+    record.SetStage("extractor_0", {.num_repaired = 5});
+    record.SetEnd(3, 0);
+    return record;
+  }
+
+  std::string folder_;
+};
+
+TEST(PoseText, TumRowHasTheTimeToTheMicrosecond) {
+  const Rigid3 pose{Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1.0, -2.5, 1e-9}};
+  EXPECT_EQ(TumRow(1'403'636'584'763'555, pose),
+            "1403636584.763555 1.000000000 -2.500000000 0.000000001 -0.500000000 0.500000000 0.500000000 0.500000000\n");
+  EXPECT_EQ(TumRow(3, {}).substr(0, 9), "0.000003 ");
+  EXPECT_EQ(TumRow(-1'500'000, {}).substr(0, 10), "-1.500000 ");
+}
+
+TEST(PoseText, KittiRowIsTheMatrixRowByRow) {
+  const Rigid3 pose{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ())), {1.0, 2.0, 3.0}};
+  double numbers[12];
+  std::istringstream row(KittiRow(pose));
+  for (double& number : numbers) {
+    row >> number;
+  }
+  EXPECT_NEAR(numbers[0], -1.0, 1e-9);
+  EXPECT_EQ(numbers[3], 1.0);
+  EXPECT_NEAR(numbers[5], -1.0, 1e-9);
+  EXPECT_EQ(numbers[7], 2.0);
+  EXPECT_EQ(numbers[10], 1.0);
+  EXPECT_EQ(numbers[11], 3.0);
+}
+
+TEST_F(RunFilesTest, WritesAllFilesAndLeavesNothingBeside) {
+  const std::string folder = folder_ + "/new/run";
+  WriteRun(SmallRun(), folder);
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    names.push_back(entry.path().filename());
+  }
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names, (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "run.json",
+                                             "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
+}
+
+TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {
+  WriteRun(SmallRun(), folder_);
+  EXPECT_EQ(Read("trajectory.txt"),
+            "# timestamp tx ty tz qx qy qz qw\n"
+            "1403636584.763556 0.250000000 -1.000000000 2.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n");
+  EXPECT_EQ(Read("trajectory_live.txt"), Read("trajectory.txt"));
+  const std::string kitti = Read("trajectory_kitti.txt"), truth = Read("ground_truth.txt");
+  EXPECT_EQ(std::count(kitti.begin(), kitti.end(), '\n'), 3);
+  EXPECT_EQ(std::count(truth.begin(), truth.end(), '\n'), 4);
+}
+
+TEST_F(RunFilesTest, FramesCsvHasARowPerFrame) {
+  EXPECT_EQ(FramesCsv(SmallRun()),
+            "frame,utime_us,state,pose_time_ms,latency_ms,features,matches,inliers,landmarks,is_keyframe\n"
+            "0,1403636584763555,initializing,,10.000,2000,50,40,900,0\n"
+            "1,1403636584763556,tracked,4.000,14.000,2000,50,40,900,1\n"
+            "2,1403636584763557,lost,4.000,18.000,2000,50,40,900,0\n");
+}
+
+TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
+  const RunRecord record = SmallRun();
+  const auto json = nlohmann::json::parse(RunJson(record));
+  EXPECT_EQ(json["frames"], 3);
+  EXPECT_EQ(json["frames_tracked"], 1);
+  EXPECT_EQ(json["frames_lost"], 1);
+  EXPECT_EQ(json["frames_initializing"], 1);
+  EXPECT_EQ(json["frames_dropped"], 0);
+  EXPECT_EQ(json["tracking_failures"], 1);
+  EXPECT_EQ(json["keyframes"], 1);
+  EXPECT_EQ(json["landmarks"], 900);
+  EXPECT_DOUBLE_EQ(json["pose_time_ms"]["median"], 4.0);
+  EXPECT_DOUBLE_EQ(json["latency_ms"]["max"], 18.0);
+  EXPECT_EQ(json["stage_ms"]["tracker"]["p95"], 4.0);
+  EXPECT_FALSE(json["stage_ms"].contains("extractor_0"));  // it has no step yet
+  EXPECT_EQ(json["messages_repaired"], 7);
+  EXPECT_EQ(json["messages_lost"], 1);
+  EXPECT_EQ(json["trajectory_sha256"], record.TrajectorySha256());
+  EXPECT_EQ(json["map_sha256"], record.MapSha256());
+}
+
+TEST_F(RunFilesTest, AnEmptyRunHasFilesToo) {
+  WriteRun(RunRecord(), folder_);
+  const auto json = nlohmann::json::parse(Read("run.json"));
+  EXPECT_EQ(json["frames"], 0);
+  EXPECT_TRUE(json["pose_time_ms"].is_null());
+}
+
+TEST_F(RunFilesTest, WhatCantBeWrittenIsToldAndTheOldFileStays) {
+  WriteFile(folder_ + "/a.txt", "old");
+  WriteFile(folder_ + "/a.txt", "new");
+  EXPECT_EQ(Read("a.txt"), "new");
+  EXPECT_THROW(WriteFile(folder_ + "/none/a.txt", "x"), InputError);
+  EXPECT_THROW(WriteRun(SmallRun(), folder_ + "/a.txt"), InputError);
+  fs::create_directories(folder_ + "/dir.txt/inside");
+  EXPECT_THROW(WriteFile(folder_ + "/dir.txt", "x"), InputError);
+}
+
+}  // namespace
+}  // namespace tessera

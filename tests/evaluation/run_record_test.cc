@@ -1,0 +1,160 @@
+#include "evaluation/run_record.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace tessera {
+namespace {
+
+PoseEstimate Pose(int64_t frame, TrackingState state, double x = 0.0) {
+  PoseEstimate pose;
+  pose.frame = FrameId{frame};
+  pose.utime_us = 100'000 * frame;
+  pose.arrival_us = 5'000'000 + 10'000 * frame;
+  pose.state = state;
+  pose.world_from_camera.translation = {x, 0.0, 0.0};
+  pose.num_landmarks = static_cast<int32_t>(100 + frame);
+  return pose;
+}
+
+KeyframeObservation Keyframe(int64_t id, int64_t frame, double x) {
+  KeyframeObservation keyframe;
+  keyframe.id = KeyframeId{id};
+  keyframe.features.frame = FrameId{frame};
+  keyframe.features.utime_us = 100'000 * frame;
+  keyframe.features.keypoints = {{.x_px = 1.5F, .y_px = 2.0F}, {.x_px = 3.0F, .y_px = 4.0F}};
+  keyframe.landmarks = {LandmarkId{7}, LandmarkId{}};
+  keyframe.world_from_camera.translation = {x, 0.0, 0.0};
+  return keyframe;
+}
+
+constexpr auto kInitializing = TrackingState::kInitializing;
+constexpr auto kTracked = TrackingState::kTracked;
+constexpr auto kLost = TrackingState::kLost;
+
+RunRecord RecordOf(const std::vector<TrackingState>& states, int64_t first_frame = 0) {
+  RunRecord record;
+  for (size_t i = 0; i < states.size(); ++i) {
+    const int64_t frame = first_frame + static_cast<int64_t>(i);
+    record.AddPose(Pose(frame, states[i], static_cast<double>(frame)), 5'030'000 + 20'000 * frame);
+  }
+  return record;
+}
+
+TEST(RunRecord, CountsFramesByWhatBecameOfThem) {
+  RunRecord record =
+      RecordOf({kInitializing, kInitializing, kTracked, kLost, kLost, kTracked, kTracked, kLost, kInitializing});
+  record.SetEnd(12, 3);
+  const FrameCounts counts = record.Counts();
+  EXPECT_EQ(counts.frames, 12);
+  EXPECT_EQ(counts.initializing, 2);
+  EXPECT_EQ(counts.tracked, 3);
+  EXPECT_EQ(counts.lost, 4);
+  EXPECT_EQ(counts.dropped, 3);
+  EXPECT_EQ(counts.tracking_failures, 2);
+  EXPECT_EQ(record.num_landmarks(), 108);
+}
+
+TEST(RunRecord, WithoutAnEndTheStagesTellOfDroppedFrames) {
+  RunRecord record = RecordOf({kTracked});
+  record.SetStage("camera", {.num_dropped = 1});
+  record.SetStage("dispatcher", {.num_dropped = 2});
+  record.SetStage("dispatcher", {.num_dropped = 5});
+  EXPECT_EQ(record.Counts().dropped, 6);
+  EXPECT_EQ(RunRecord().Counts().frames, 0);
+}
+
+TEST(RunRecord, MeasuresPoseTimeAndLatency) {
+  const std::vector<FrameRecord> frames = RecordOf({kTracked, kTracked}).Frames();
+  ASSERT_EQ(frames.size(), 2U);
+  EXPECT_FALSE(frames[0].pose_time_ms);
+  EXPECT_DOUBLE_EQ(*frames[1].pose_time_ms, 20.0);
+  EXPECT_DOUBLE_EQ(*frames[0].latency_ms, 30.0);
+  EXPECT_DOUBLE_EQ(*frames[1].latency_ms, 40.0);
+}
+
+TEST(RunRecord, FinalPosesFollowTheirKeyframes) {
+  RunRecord record;
+  PoseEstimate pose = Pose(3, kTracked, 5.0);
+  pose.reference_keyframe = KeyframeId{1};
+  pose.reference_from_camera.translation = {0.0, 0.0, 2.0};
+  record.AddPose(pose, 1);
+  record.AddPose(Pose(4, kTracked, 6.0), 2);  // without a reference: stays as it was
+  KeyframeObservation keyframe = Keyframe(1, 2, 10.0);
+  keyframe.world_from_camera.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitY()));
+  record.AddKeyframe(keyframe);
+  const std::vector<StampedPose> trajectory = record.Trajectory();
+  ASSERT_EQ(trajectory.size(), 2U);
+  EXPECT_EQ(trajectory[0].frame.value, 3);
+  EXPECT_EQ(trajectory[0].utime_us, 300'000);
+  EXPECT_LT((trajectory[0].world_from_camera.translation - Eigen::Vector3d(12.0, 0.0, 0.0)).norm(), 1e-12);
+  EXPECT_EQ(trajectory[1].world_from_camera.translation.x(), 6.0);
+  EXPECT_EQ(record.LiveTrajectory()[0].world_from_camera.translation.x(), 5.0);
+}
+
+TEST(RunRecord, EveryFrameOfTheSourceHasARow) {
+  // Frames 10 .. 17 of a source; 12 and 17 were dropped on the way, 10 is before the map, 14 is lost.
+  RunRecord record;
+  for (const int64_t frame : {10, 11, 13, 14, 15, 16}) {
+    const TrackingState state = frame == 10 ? kInitializing : frame == 14 ? kLost : kTracked;
+    record.AddPose(Pose(frame, state, static_cast<double>(frame)), frame);
+  }
+  record.SetEnd(18, 2);
+  std::vector<double> xs;
+  for (const Rigid3& pose : record.PosePerFrame()) {
+    xs.push_back(pose.translation.x());
+  }
+  EXPECT_EQ(xs, (std::vector<double>{0.0, 11.0, 11.0, 13.0, 13.0, 15.0, 16.0, 16.0}));
+}
+
+TEST(RunRecord, AFirstFrameThatWasDroppedHasARowToo) {
+  RunRecord record = RecordOf({kTracked, kTracked}, 1);
+  record.SetEnd(3, 1);
+  EXPECT_EQ(record.PosePerFrame().size(), 3U);
+  EXPECT_TRUE(RunRecord().PosePerFrame().empty());
+}
+
+TEST(RunRecord, WhatComesTwiceCountsOnce) {
+  RunRecord record = RecordOf({kTracked, kTracked});
+  const std::string trajectory_hash = record.TrajectorySha256();
+  record.AddPose(Pose(1, kLost, 99.0), 9'000'000);
+  record.AddKeyframe(Keyframe(0, 0, 0.0));
+  const std::string map_hash = record.MapSha256();
+  record.AddKeyframe(Keyframe(0, 0, 1.0));
+  EXPECT_EQ(record.Counts().tracked, 2);
+  EXPECT_EQ(record.TrajectorySha256(), trajectory_hash);
+  EXPECT_EQ(record.MapSha256(), map_hash);
+  EXPECT_EQ(record.num_keyframes(), 1);
+}
+
+TEST(RunRecord, HashesDependOnEveryBitButNotOnTheOrderOfArrivalNorOnTimes) {
+  RunRecord forward, backward;
+  for (int i = 0; i < 3; ++i) {
+    forward.AddPose(Pose(i, kTracked, i), 100 + i);
+    forward.AddKeyframe(Keyframe(i, i, i));
+    PoseEstimate late = Pose(2 - i, kTracked, 2 - i);
+    late.arrival_us = 1;
+    backward.AddPose(late, 500 + i);
+    backward.AddKeyframe(Keyframe(2 - i, 2 - i, 2 - i));
+  }
+  EXPECT_EQ(forward.TrajectorySha256(), backward.TrajectorySha256());
+  EXPECT_EQ(forward.MapSha256(), backward.MapSha256());
+
+  RunRecord moved = RecordOf({kTracked, kTracked}), same = RecordOf({kTracked, kTracked});
+  EXPECT_EQ(moved.TrajectorySha256(), same.TrajectorySha256());
+  moved.AddPose(Pose(2, kTracked, 2.0), 1);
+  same.AddPose(Pose(2, kTracked, std::nextafter(2.0, 3.0)), 1);
+  EXPECT_NE(moved.TrajectorySha256(), same.TrajectorySha256());
+
+  RunRecord a, b;
+  KeyframeObservation keyframe = Keyframe(0, 0, 0.0);
+  a.AddKeyframe(keyframe);
+  keyframe.landmarks[1] = LandmarkId{8};
+  b.AddKeyframe(keyframe);
+  EXPECT_NE(a.MapSha256(), b.MapSha256());
+}
+
+}  // namespace
+}  // namespace tessera
