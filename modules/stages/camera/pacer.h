@@ -1,0 +1,50 @@
+// Decides when the next frame of a source may be sent.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "core/ids.h"
+
+namespace tessera {
+
+struct PacerOptions {
+  enum class Kind {
+    kFree,      // at once: a live source comes at its own pace, and a recorder takes all
+    kLockstep,  // as fast as poses come back
+    kTimed,     // by the source's timestamps
+  };
+  Kind kind = Kind::kLockstep;
+  double speed = 1.0;       // kTimed: seconds of the source in one second of the clock
+  int lockstep_window = 6;  // kLockstep: frames sent and not yet tracked; enough that no stage ever waits for work
+};
+
+// "lockstep", "realtime", or a speed factor > 0 such as "0.5". Throws InputError.
+PacerOptions ParsePace(const std::string& text);
+
+class Pacer {
+ public:
+  explicit Pacer(const PacerOptions& options) : options_(options) {}
+
+  // Whether the frame that was taken at `utime_us` may go. The first frame asked about starts the clock of kTimed.
+  bool MayGo(int64_t utime_us, int64_t now_us);
+  void MarkSent(FrameId frame);
+  // This frame, and all before it, have a pose.
+  void MarkTracked(FrameId frame);
+
+  // Frames sent and not yet tracked; only kLockstep counts them.
+  int num_ahead() const { return static_cast<int>(ahead_.size()); }
+
+ private:
+  struct Start {
+    int64_t utime_us = 0;
+    int64_t now_us = 0;
+  };
+  PacerOptions options_;
+  std::optional<Start> start_;
+  std::set<FrameId> ahead_;
+};
+
+}  // namespace tessera
