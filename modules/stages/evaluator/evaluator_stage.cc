@@ -1,0 +1,127 @@
+#include "stages/evaluator/evaluator_stage.h"
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+
+#include "core/errors.h"
+#include "evaluation/run_files.h"
+#include "map/tracking_types.h"
+#include "transport/stage_messages.h"
+
+namespace tessera {
+namespace {
+
+// Each stage speaks twice a second; the figures of a run are those that it gives after the end.
+constexpr int64_t kMaxWaitForStatusUs = 1'000'000;
+// After the tracker's end, a pose that has not come for this long won't come any more.
+constexpr int64_t kLastPoseTimeoutUs = 5'000'000;
+
+StageFigures FiguresOf(const StageStatus& status) {
+  const StepStatistics& step = status.step;
+  return {.step_ms = {step.count, step.mean_ms, step.median_ms, step.p95_ms, step.p99_ms, step.max_ms},
+          .num_repaired = status.num_repaired,
+          .num_lost = status.num_lost,
+          .num_dropped = status.num_dropped};
+}
+
+}  // namespace
+
+EvaluatorStage::EvaluatorStage(StageContext& context)
+    : context_(context), out_dir_(context.settings().Get<std::string>("evaluator.out_dir")) {
+  if (!out_dir_.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(out_dir_, error);
+    if (error) {
+      throw InputError("evaluator.out_dir " + out_dir_ + " can't be made: " + error.message() + "; choose another folder");
+    }
+  }
+  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo& info) {
+    record_.AddPose(pose, info.publish_us);
+    last_pose_ = std::max(last_pose_, pose.frame);
+    last_news_us_ = context_.now_us();
+    FinishIfDone();
+  });
+  context.Subscribe<KeyframeObservation>(kKeyframeChannel, [this](const KeyframeObservation& keyframe, const MessageInfo&) {
+    record_.AddKeyframe(keyframe);
+  });
+  context.Subscribe<GroundTruthPose>(kGroundTruthChannel, [this](const GroundTruthPose& truth, const MessageInfo&) {
+    record_.AddGroundTruth(truth);
+  });
+  context.Subscribe<EndOfStream>(kEndOfStreamChannel,
+                                 [this](const EndOfStream& end, const MessageInfo&) { OnEnd(end); });
+  context.Subscribe<StageStatus>(kStatusChannel,
+                                 [this](const StageStatus& status, const MessageInfo&) { OnStatus(status); });
+  context.Every(std::chrono::milliseconds(50), [this] { FinishIfDone(); });
+}
+
+EvaluatorStage::~EvaluatorStage() {
+  if (record_.empty() && !end_) {
+    return;  // the run never began
+  }
+  try {
+    Write();
+  } catch (const std::exception& error) {
+    context_.ReportError(error.what());
+  }
+}
+
+void EvaluatorStage::OnStatus(const StageStatus& status) {
+  record_.SetStage(status.name, FiguresOf(status));
+  heard_us_[status.name] = context_.now_us();
+}
+
+void EvaluatorStage::OnEnd(const EndOfStream& end) {
+  if (end.stage == "tracker" && !end_) {
+    end_ = end;
+    last_news_us_ = context_.now_us();
+    record_.SetEnd(end.num_frames, end.num_dropped);
+    FinishIfDone();
+  }
+}
+
+bool EvaluatorStage::HasAllPoses() const {
+  const bool has_last = last_pose_.value + 1 >= end_->num_frames;
+  return has_last || context_.now_us() - last_news_us_ > kLastPoseTimeoutUs;
+}
+
+// Every stage that was alive lately has given its figures since the run was complete.
+bool EvaluatorStage::HaveAllReported() const {
+  return std::all_of(heard_us_.begin(), heard_us_.end(), [&](const auto& heard) {
+    return heard.first == context_.name() || heard.second > *complete_us_ ||
+           heard.second < *complete_us_ - kMaxWaitForStatusUs;
+  });
+}
+
+void EvaluatorStage::FinishIfDone() {
+  if (is_written_ || !end_ || !HasAllPoses()) {
+    return;
+  }
+  if (!complete_us_) {
+    complete_us_ = context_.now_us();
+  }
+  if (!HaveAllReported() && context_.now_us() - *complete_us_ < kMaxWaitForStatusUs) {
+    return;
+  }
+  try {
+    Write();
+  } catch (const InputError& error) {
+    context_.Fail(error.what(), 2);
+    return;
+  }
+  context_.Finish();
+}
+
+void EvaluatorStage::Write() {
+  if (is_written_) {
+    return;
+  }
+  is_written_ = true;  // also when it fails: trying again would fail again
+  if (out_dir_.empty()) {
+    return;
+  }
+  WriteRun(record_, out_dir_);
+  context_.Info("wrote the run to " + out_dir_);
+}
+
+}  // namespace tessera

@@ -1,0 +1,42 @@
+// Wiring of the evaluator: what the stages say goes into a RunRecord, which is written once the run has ended.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "evaluation/run_record.h"
+#include "transport/stage.h"
+
+namespace tessera {
+
+class EvaluatorStage {
+ public:
+  // Makes the run's folder. Throws InputError if it can't.
+  explicit EvaluatorStage(StageContext& context);
+  // Told to stop before the end, it writes what there is.
+  ~EvaluatorStage();
+  EvaluatorStage(const EvaluatorStage&) = delete;
+  EvaluatorStage& operator=(const EvaluatorStage&) = delete;
+
+ private:
+  void OnStatus(const StageStatus& status);
+  void OnEnd(const EndOfStream& end);
+  bool HasAllPoses() const;
+  bool HaveAllReported() const;
+  void FinishIfDone();
+  void Write();
+
+  StageContext& context_;
+  std::string out_dir_;
+  RunRecord record_;
+  std::optional<EndOfStream> end_;
+  FrameId last_pose_;
+  int64_t last_news_us_ = 0;                 // when the last pose or the end came
+  std::optional<int64_t> complete_us_;       // when the end and all poses were there
+  std::map<std::string, int64_t> heard_us_;  // by stage: when its last status came
+  bool is_written_ = false;
+};
+
+}  // namespace tessera
