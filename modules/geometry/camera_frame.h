@@ -30,7 +30,8 @@ struct GroundTruthPose {
   Rigid3 world_from_camera;  // metres; any world frame
 };
 
-// The stage `stage` has sent all it will ever send: the stream has frames 0 .. num_frames - 1, of which it dropped some.
+// The stage `stage` has sent all it will ever send: the last frame of the stream is num_frames - 1 (the first need not
+// be 0: frames keep their source's numbers), and of all that came to it, it and those before it dropped some.
 struct EndOfStream {
   std::string stage;
   int64_t num_frames = 0;
