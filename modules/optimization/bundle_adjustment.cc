@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "optimization/bundle_costs.h"
 #include "optimization/bundle_solver.h"
 
 namespace tessera {

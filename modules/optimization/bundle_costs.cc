@@ -67,8 +67,8 @@ bool ReprojectionCost<kRows, kPoseBlocks...>::Evaluate(double const* const* para
                                                        double** jacobians) const {
   constexpr int kBlock = 6 / sizeof...(kPoseBlocks);
   Eigen::Map<Eigen::Matrix<double, kRows, 1>> residual(residuals);
-  const Eigen::Vector3d rotated = pose_.rotation * Eigen::Map<const Eigen::Vector3d>(parameters[0]);
-  const Eigen::Vector3d point_in_camera = rotated + pose_.translation;
+  const Eigen::Vector3d point_in_camera =
+      pose_.rotation * Eigen::Map<const Eigen::Vector3d>(parameters[0]) + pose_.translation;
   const bool is_behind = point_in_camera.z() < kMinDepth;
   Reprojection r;
   if (is_behind) {
@@ -91,8 +91,12 @@ bool ReprojectionCost<kRows, kPoseBlocks...>::Evaluate(double const* const* para
   if (jacobians[1] != nullptr) {
     Eigen::Matrix<double, kRows, 6> by_tangent;
     by_tangent.template leftCols<3>() = by_camera;
-    const Eigen::Matrix3d by_w = Skew(pose_.v - point_in_camera).lazyProduct(pose_.left_jacobian);
-    by_tangent.template rightCols<3>() = by_camera.lazyProduct(by_w);
+    const Eigen::Vector3d rotated = point_in_camera - pose_.v;
+    Eigen::Matrix<double, kRows, 3> by_rotation;  // row' * -[rotated]x = (rotated x row)'
+    for (int i = 0; i < kRows; ++i) {
+      by_rotation.row(i) = rotated.cross(by_camera.row(i).transpose()).transpose();
+    }
+    by_tangent.template rightCols<3>() = by_rotation.lazyProduct(pose_.left_jacobian);
     WriteBlocks<kBlock, kRows>(by_tangent, jacobians + 1);
   }
   return true;

@@ -3,7 +3,7 @@
 // A pose is optimised as the tangent (v, w) of Retract at the pose where the solve began, so that Ceres sees plain
 // vectors: camera_from_world = Retract(base, (v, w)). Corrections are far below half a turn, where this is a chart
 // without seams. What depends on the pose alone is computed once an evaluation (EvaluationCallback), not once an
-// observation. Together that is a quarter of the time of a seven-parameter pose with a Manifold (README.md).
+// observation. Together that saves a fifth of the time of a seven-parameter pose with a Manifold (README.md).
 #pragma once
 
 #include <ceres/evaluation_callback.h>
