@@ -15,10 +15,12 @@ namespace {
 // A map of the file, which complains with the file's path and the full name of the key.
 class Section {
  public:
-  Section(std::string path, std::string prefix, YAML::Node node, std::initializer_list<const char*> known_keys)
+  Section(std::string path, std::string prefix, YAML::Node node,
+          std::initializer_list<const char*> known_keys)
       : path_(std::move(path)), prefix_(std::move(prefix)), node_(std::move(node)) {
     if (!node_.IsMap()) {
-      throw InputError("calibration file " + path_ + " must hold `key: value` lines; config/cameras/example.yaml shows how");
+      throw InputError("calibration file " + path_ +
+                       " must hold `key: value` lines; config/cameras/example.yaml shows how");
     }
     for (const auto& entry : node_) {
       const auto key = entry.first.as<std::string>();
@@ -98,7 +100,7 @@ Rigid3 ReadRigid(const Section& section, const std::string& key) {
   }
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers.data());
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-  if ((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-3 || rotation.determinant() < 0.0) {
+  if (!IsRotation(rotation)) {
     section.Complain(key, "must begin with a rotation in its first three columns");
   }
   return Rigid3::FromMatrix(rotation, matrix.col(3));
@@ -106,7 +108,8 @@ Rigid3 ReadRigid(const Section& section, const std::string& key) {
 
 void ReadRightCamera(const Section& section, const std::string& path, CameraRig& rig) {
   if (section.Has("right") && section.Has("baseline_m")) {
-    section.Complain("baseline_m", "and `right` exclude each other: keep `right` for images that are not rectified yet");
+    section.Complain("baseline_m",
+                     "and `right` exclude each other: keep `right` for images that are not rectified yet");
   }
   if (section.Has("baseline_m")) {
     const double baseline_m = section.Number("baseline_m");
@@ -134,8 +137,8 @@ CameraRig LoadCalibrationFile(const std::string& path) {
     throw InputError("calibration file " + path + " is not valid YAML: " + error.what());
   }
   const Section section(path, "", document,
-                        {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion", "depth_unit_m",
-                         "baseline_m", "right"});
+                        {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion",
+                         "depth_unit_m", "baseline_m", "right"});
   CameraRig rig;
   rig.left = ReadPinhole(section);
   if (section.Has("width_px") || section.Has("height_px")) {

@@ -1,4 +1,4 @@
-// Calibration files of one's own cameras (`--camera FILE.yaml`). config/cameras/example.yaml is a commented one.
+// Calibration files of one's own cameras (`--camera FILE.yaml`), such as config/cameras/example.yaml.
 //
 //   width_px: 752                  # image size; may be left out, then the first image decides
 //   height_px: 480
@@ -8,7 +8,7 @@
 //   cy_px: 248.375
 //   distortion: [k1, k2, p1, p2]   # radial-tangential (camera_rig.h); 4, 5 or 8 numbers; may be left out
 //   depth_unit_m: 0.001            # RGB-D: metres per count of the depth image
-//   baseline_m: 0.54               # stereo, images rectified already: distance of the cameras; or, if they aren't:
+//   baseline_m: 0.54               # stereo, images rectified already: distance of the cameras; if they are not:
 //   right:                         # the right camera: fx_px, fy_px, cx_px, cy_px, distortion, and
 //     right_from_left: [...]       #   12 numbers, [R | t] row by row, t in metres: x_right = R x_left + t
 #pragma once

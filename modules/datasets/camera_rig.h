@@ -10,7 +10,8 @@
 
 namespace tessera {
 
-// Pinhole with radial-tangential distortion (Brown's model in OpenCV's form). With x = X/Z, y = Y/Z, r2 = x^2 + y^2:
+// Pinhole with radial-tangential distortion (Brown's model in OpenCV's form).
+// With x = X/Z, y = Y/Z, r2 = x^2 + y^2:
 //
 //   c  = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
 //   u  = fx (x c + 2 p1 x y + p2 (r2 + 2 x^2)) + cx           [px]
@@ -41,5 +42,8 @@ struct CameraRig {
 
 // A pair that is rectified already: the same pinhole twice, `baseline_m` apart.
 CameraRig RectifiedPair(const PinholeCamera& camera, double baseline_m);
+
+// Whether a matrix that somebody typed or printed is a rotation, up to the digits that got lost on the way.
+bool IsRotation(const Eigen::Matrix3d& matrix);
 
 }  // namespace tessera

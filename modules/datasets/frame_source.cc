@@ -23,7 +23,8 @@ std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   const std::string kind = source.substr(0, source.find(':'));
   const std::string rest = source.size() > kind.size() ? source.substr(kind.size() + 1) : "";
   if (rest.empty()) {
-    throw InputError("source `" + source + "` must be kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://... or log:FILE");
+    throw InputError("source `" + source +
+                     "` must be kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://... or log:FILE");
   }
   if (kind == "kitti") return PlayRecording(LoadKitti(rest, options), options);
   if (kind == "euroc") return PlayRecording(LoadEuroc(rest, options), options);
@@ -31,7 +32,9 @@ std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   if (kind == "video") return OpenVideoFile(rest, options);
   if (kind == "camera") return OpenDevice(rest, options);
   if (kind == "rtsp" || kind == "rtsps") return OpenNetworkStream(source, options);
-  throw InputError("source `" + source + "` is of an unknown kind: give kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://... or log:FILE");
+  throw InputError("source `" + source +
+                   "` is of an unknown kind: give kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, "
+                   "rtsp://... or log:FILE");
 }
 
 }  // namespace tessera

@@ -1,8 +1,8 @@
 // Where frames come from: folders of data sets, videos, cameras.
 //
-// A frame keeps the number that it has in its source, also when only some frames are asked for, so that frame 100 of
-// a sequence is frame 100 in every run, log and table. The first frame of a source is frame 0; for a stereo or RGB-D
-// source whose images are associated by time, pairs are counted.
+// A frame keeps the number that it has in its source, also when only some frames are asked for, so that frame
+// 100 of a sequence is frame 100 in every run, log and table. The first frame of a source is frame 0; for a
+// stereo or RGB-D source whose images are associated by time, pairs are counted.
 #pragma once
 
 #include <cstdint>
@@ -18,10 +18,10 @@ namespace tessera {
 struct SourceOptions {
   std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://...
   SensorType sensor = SensorType::kMono;  // mono takes the left images of a pair
-  std::string calibration_path;           // YAML (calibration_file.h), instead of the source's own; empty: its own
-  double depth_unit_m = 0.0;              // RGB-D: metres per count, instead of what the source says; 0: as it says
-  int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
-  int64_t last_frame = -1;                // -1: to the end
+  std::string calibration_path;  // YAML (calibration_file.h), instead of the source's own; empty: its own
+  double depth_unit_m = 0.0;     // RGB-D: metres per count, instead of what the source says; 0: as it says
+  int64_t first_frame = 0;       // frames first_frame .. last_frame - 1 are wanted
+  int64_t last_frame = -1;       // -1: to the end
 };
 
 class FrameSource {

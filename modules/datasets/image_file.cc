@@ -17,8 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 12> kExtensions = {".png", ".jpg",  ".jpeg", ".pgm",  ".ppm", ".bmp",
-                                                          ".tif", ".tiff", ".webp", ".jpe",  ".pnm", ".jp2"};
+constexpr std::array<std::string_view, 12> kExtensions = {".png", ".jpg",  ".jpeg", ".pgm", ".ppm", ".bmp",
+                                                          ".tif", ".tiff", ".webp", ".jpe", ".pnm", ".jp2"};
 
 bool HasImageExtension(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -29,8 +29,8 @@ bool HasImageExtension(const fs::path& path) {
 
 unsigned Byte(const std::string& bytes, size_t at) { return static_cast<unsigned char>(bytes[at]); }
 
-// A JPEG is a list of segments (FF, marker, two bytes of length, ...) up to the start of scan (FF DA); then comes
-// entropy-coded data, in which FF D9 can't occur but as the end of the image (ITU-T T.81, B.1.1).
+// A JPEG is a list of segments (FF, marker, two bytes of length, ...) up to the start of scan (FF DA); then
+// comes entropy-coded data, in which FF D9 can't occur but as the end of the image (ITU-T T.81, B.1.1).
 bool IsCompleteJpeg(const std::string& bytes) {
   size_t at = 2;
   while (at + 4 <= bytes.size() && Byte(bytes, at) == 0xFF && Byte(bytes, at + 1) != 0xDA) {
@@ -118,7 +118,8 @@ GrayImage ReadGrayImage(const std::string& path) {
 DepthImage ReadDepthImage(const std::string& path) {
   const cv::Mat depth = Decode(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (depth.type() != CV_16UC1) {
-    throw InputError("depth image " + path + " must have one channel of 16 bits: convert it, for example to a 16-bit PNG");
+    throw InputError("depth image " + path +
+                     " must have one channel of 16 bits: convert it, for example to a 16-bit PNG");
   }
   return CopyPixels<uint16_t>(depth);
 }
@@ -151,8 +152,9 @@ std::string FindImage(const std::string& path) {
 void RequireSize(int width_px, int height_px, int expected_width_px, int expected_height_px,
                  const std::string& what) {
   if (width_px != expected_width_px || height_px != expected_height_px) {
-    throw InputError(what + " is " + std::to_string(width_px) + "x" + std::to_string(height_px) + " px, but " +
-                     std::to_string(expected_width_px) + "x" + std::to_string(expected_height_px) +
+    throw InputError(what + " is " + std::to_string(width_px) + "x" + std::to_string(height_px) +
+                     " px, but " + std::to_string(expected_width_px) + "x" +
+                     std::to_string(expected_height_px) +
                      " px is what the calibration or the first image says: all images must have one size");
   }
 }

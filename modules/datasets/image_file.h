@@ -1,5 +1,5 @@
-// Image files of data sets, in any format that OpenCV reads, checked for completeness: OpenCV itself fills the
-// missing part of a truncated JPEG or PNG with grey and says nothing.
+// Image files of data sets, in any format that OpenCV reads, checked for completeness: OpenCV itself fills
+// the missing part of a truncated JPEG or PNG with grey and says nothing.
 #pragma once
 
 #include <string>
@@ -16,10 +16,10 @@ GrayImage ReadGrayImage(const std::string& path);
 // The counts of a depth image file: one channel of 16 bits. Throws InputError as above.
 DepthImage ReadDepthImage(const std::string& path);
 
-// The image files in a folder, told by their extension, in order of their names; none if there is no such folder.
+// The image files in a folder, told by their extension, in order of their names; none if it does not exist.
 std::vector<std::string> ListImages(const std::string& folder);
 
-// `path`, or the file of the same name with another image extension if that is what exists; empty if none does.
+// `path`, or the file of the same name with another image extension, whichever exists; empty if none does.
 std::string FindImage(const std::string& path);
 
 // Throws InputError with what is wrong and where if the image isn't of this size.

@@ -8,14 +8,16 @@
 namespace tessera {
 
 std::optional<PinholeCamera> PinholeFromText(const std::string& text) {
-  static const std::regex kChain(R"(((?:\b(?:fx|fy|cx|cy)\s*[=:]\s*)+)([0-9]+(?:\.[0-9]+)?))", std::regex::icase);
+  static const std::regex kChain(R"(((?:\b(?:fx|fy|cx|cy)\s*[=:]\s*)+)([0-9]+(?:\.[0-9]+)?))",
+                                 std::regex::icase);
   static const std::regex kKey(R"(fx|fy|cx|cy)", std::regex::icase);
   std::map<std::string, double> values;
   for (std::sregex_iterator chain(text.begin(), text.end(), kChain), end; chain != end; ++chain) {
     const std::string keys = (*chain)[1];
     for (std::sregex_iterator key(keys.begin(), keys.end(), kKey); key != end; ++key) {
       std::string name = key->str();
-      std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      std::transform(name.begin(), name.end(), name.begin(),
+                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
       values.emplace(name, std::stod((*chain)[2]));
     }
   }

@@ -8,8 +8,8 @@
 
 namespace tessera {
 
-// The pinhole of a text such as `fx=fy=585 cx=320 cy = 240.5` (pixels): every key of a chain gets the number at its
-// end, and the first mention of a key counts. nullopt unless all four are there and make sense.
+// The pinhole of a text such as `fx=fy=585 cx=320 cy = 240.5` (pixels): every key of a chain gets the number
+// at its end, and the first mention of a key counts. nullopt unless all four are there and make sense.
 std::optional<PinholeCamera> PinholeFromText(const std::string& text);
 
 // Metres per count of depth images, from `factor N` (counts per metre; the first mention) or else the word

@@ -1,5 +1,5 @@
-// A data set on disk, opened but not yet rectified: what the readers of the single formats (KITTI, EuRoC, TUM) make,
-// and RecordedSource plays.
+// A data set on disk, opened but not yet rectified: what the readers of the single formats (KITTI, EuRoC,
+// TUM) make, and RecordedSource plays.
 #pragma once
 
 #include <cstdint>
@@ -29,13 +29,13 @@ std::unique_ptr<ImageReader> ReadImageFiles(std::vector<std::string> paths);
 std::unique_ptr<ImageReader> ReadVideoImages(const std::string& path, int64_t num_images);
 
 struct Recording {
-  std::vector<int64_t> utimes_us;             // by frame
-  std::string times_path;                     // the file that they stand in
-  std::unique_ptr<ImageReader> left;          // at least as many images as utimes_us
-  std::unique_ptr<ImageReader> right;         // stereo
-  std::vector<std::string> depth_paths;       // RGB-D: by frame
-  CameraRig rig;                              // image size may be left open
-  std::vector<GroundTruthPose> ground_truth;  // of the left camera before rectification; increasing frame numbers
+  std::vector<int64_t> utimes_us;        // by frame
+  std::string times_path;                // the file that they stand in
+  std::unique_ptr<ImageReader> left;     // at least as many images as utimes_us
+  std::unique_ptr<ImageReader> right;    // stereo
+  std::vector<std::string> depth_paths;  // RGB-D: by frame
+  CameraRig rig;                         // image size may be left open
+  std::vector<GroundTruthPose> ground_truth;  // of the left camera before rectification; by frame
   std::vector<std::string> notes;
 };
 
@@ -44,8 +44,8 @@ Recording LoadKitti(const std::string& folder, const SourceOptions& options);
 Recording LoadEuroc(const std::string& folder, const SourceOptions& options);
 Recording LoadTum(const std::string& folder, const SourceOptions& options);
 
-// Plays the recording. Throws InputError if the wanted frames are not in it, times do not increase, or the first
-// image doesn't fit.
+// Plays the recording. Throws InputError if the wanted frames are not in it, times do not increase, or the
+// first image doesn't fit.
 std::unique_ptr<FrameSource> PlayRecording(Recording recording, const SourceOptions& options);
 
 // Throws InputError unless `folder` is a folder with something in it.

@@ -10,7 +10,8 @@ namespace tessera {
 namespace {
 
 cv::Mat CameraMatrix(const PinholeCamera& camera) {
-  return (cv::Mat_<double>(3, 3) << camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0);
+  return (cv::Mat_<double>(3, 3) << camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0,
+          0.0, 1.0);
 }
 
 Eigen::Matrix3d ToEigen(const cv::Mat& matrix) {
@@ -42,8 +43,8 @@ bool SeesOnlyImage(const PinholeCamera& camera, const cv::Mat& rotation, const c
          cv::checkRange(y_px, true, nullptr, 0.0, camera.height_px - 1 + 1e-3);
 }
 
-// OpenCV fits the new image into the original at a few points of its border only, so that up to two pixels beside them
-// stay black. This narrows the view until none is.
+// OpenCV fits the new image into the original at a few points of its border only, so that up to two pixels
+// beside them stay black. This narrows the view until none is.
 constexpr double kZoomStep = 1.002;
 constexpr int kMaxZoomSteps = 200;
 
@@ -107,9 +108,11 @@ Rectifier::~Rectifier() = default;
 
 void Rectifier::PrepareSingle(const CameraRig& rig) {
   const cv::Size size(rig.left.width_px, rig.left.height_px);
-  cv::Mat matrix = cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
+  cv::Mat matrix =
+      cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
   // OpenCV would squeeze the two directions differently; features rely on patches that turn and scale evenly.
-  const double scale = std::max(matrix.at<double>(0, 0) / rig.left.fx_px, matrix.at<double>(1, 1) / rig.left.fy_px);
+  const double scale =
+      std::max(matrix.at<double>(0, 0) / rig.left.fx_px, matrix.at<double>(1, 1) / rig.left.fy_px);
   matrix.at<double>(0, 0) = scale * rig.left.fx_px;
   matrix.at<double>(1, 1) = scale * rig.left.fy_px;
   for (int step = 0; step < kMaxZoomSteps && !SeesOnlyImage(rig.left, cv::Mat(), matrix); ++step) {
@@ -121,10 +124,11 @@ void Rectifier::PrepareSingle(const CameraRig& rig) {
   calibration_.cy_px = matrix.at<double>(1, 2);
   maps_ = std::make_unique<Maps>();
   maps_->left = RemapTable(rig.left, cv::Mat(), matrix);
-  cv::convertMaps(maps_->left.whole, maps_->left.fraction, maps_->nearest.whole, maps_->nearest.fraction, CV_16SC2, true);
+  cv::convertMaps(maps_->left.whole, maps_->left.fraction, maps_->nearest.whole, maps_->nearest.fraction,
+                  CV_16SC2, true);
 }
 
-// P_left = [f 0 cx 0; 0 f cy 0; 0 0 1 0],  P_right = the same with -f * baseline [px m] in the last column's first row.
+// P_left = [f 0 cx 0; 0 f cy 0; 0 0 1 0],  P_right = the same with -f * baseline [px m] at the top right.
 void Rectifier::PreparePair(const CameraRig& rig) {
   const Eigen::Matrix3d rotation = rig.right_from_left.rotation.toRotationMatrix();
   cv::Mat cv_rotation(3, 3, CV_64F);
@@ -137,11 +141,13 @@ void Rectifier::PreparePair(const CameraRig& rig) {
   }
   const cv::Size size(rig.left.width_px, rig.left.height_px);
   cv::Mat rectified_from_left, rectified_from_right, left_projection, right_projection, unused;
-  cv::stereoRectify(CameraMatrix(rig.left), rig.left.distortion, CameraMatrix(*rig.right), rig.right->distortion, size,
-                    cv_rotation, cv_translation, rectified_from_left, rectified_from_right, left_projection,
-                    right_projection, unused, cv::CALIB_ZERO_DISPARITY, 0.0, size);
-  for (int step = 0; step < kMaxZoomSteps && !(SeesOnlyImage(rig.left, rectified_from_left, left_projection) &&
-                                               SeesOnlyImage(*rig.right, rectified_from_right, right_projection));
+  cv::stereoRectify(CameraMatrix(rig.left), rig.left.distortion, CameraMatrix(*rig.right),
+                    rig.right->distortion, size, cv_rotation, cv_translation, rectified_from_left,
+                    rectified_from_right, left_projection, right_projection, unused, cv::CALIB_ZERO_DISPARITY,
+                    0.0, size);
+  for (int step = 0;
+       step < kMaxZoomSteps && !(SeesOnlyImage(rig.left, rectified_from_left, left_projection) &&
+                                 SeesOnlyImage(*rig.right, rectified_from_right, right_projection));
        ++step) {
     ZoomIn(left_projection);
     ZoomIn(right_projection);
@@ -152,10 +158,12 @@ void Rectifier::PreparePair(const CameraRig& rig) {
   calibration_.cy_px = left_projection.at<double>(1, 2);
   calibration_.baseline_m = -right_projection.at<double>(0, 3) / right_projection.at<double>(0, 0);
   if (!(calibration_.baseline_m > 0.0)) {
-    throw InputError("the right camera of the pair stands to the left of the left one, or above or below it: "
-                     "check the extrinsics in the calibration, or exchange the cameras");
+    throw InputError(
+        "the right camera of the pair stands to the left of the left one, or above or below it: "
+        "check the extrinsics in the calibration, or exchange the cameras");
   }
-  left_from_rectified_ = Rigid3::FromMatrix(ToEigen(rectified_from_left).transpose(), Eigen::Vector3d::Zero());
+  left_from_rectified_ =
+      Rigid3::FromMatrix(ToEigen(rectified_from_left).transpose(), Eigen::Vector3d::Zero());
   maps_ = std::make_unique<Maps>();
   maps_->left = RemapTable(rig.left, rectified_from_left, left_projection);
   maps_->right = RemapTable(*rig.right, rectified_from_right, right_projection);

@@ -1,10 +1,11 @@
-// Makes images of real cameras into images of the pinhole that all later stages assume (geometry/camera.h): without
-// distortion and, for a pair, with epipolar lines along the rows.
+// Makes images of real cameras into images of the pinhole that all later stages assume (geometry/camera.h):
+// without distortion and, for a pair, with epipolar lines along the rows.
 //
-// Mono, RGB-D: the same camera without distortion; focal lengths, in their old ratio, and principal point chosen so
-// that no pixel looks outside the original image. Stereo: Bouguet's rectification (cv::stereoRectify), cropped likewise.
-// Intensities are interpolated bilinearly with fixed-point maps, the same bits on every run; depth counts are taken
-// from the nearest pixel, since a mean of two depths is a point where nothing is.
+// Mono, RGB-D: the same camera without distortion; focal lengths, in their old ratio, and principal point
+// chosen so that no pixel looks outside the original image. Stereo: Bouguet's rectification
+// (cv::stereoRectify), cropped likewise. Intensities are interpolated bilinearly with fixed-point maps, the
+// same bits on every run; depth counts are taken from the nearest pixel, since a mean of two depths is a
+// point where nothing is.
 #pragma once
 
 #include <memory>
@@ -16,8 +17,8 @@ namespace tessera {
 
 class Rectifier {
  public:
-  // `rig` must pass its Check for `sensor`, with the image size known. Throws InputError if the right camera of the
-  // pair does not stand to the right.
+  // `rig` must pass its Check for `sensor`, with the image size known. Throws InputError if the right camera
+  // of the pair does not stand to the right.
   Rectifier(const CameraRig& rig, SensorType sensor);
   ~Rectifier();
   Rectifier(const Rectifier&) = delete;

@@ -7,7 +7,7 @@
 
 namespace tessera {
 
-// A video file. Calibration: --camera, or FILE.yaml beside FILE.mp4. Times count from 0 at the video's frame rate.
+// A video file. Calibration: --camera, or FILE.yaml beside FILE.mp4. Times count from 0 at the file's rate.
 std::unique_ptr<FrameSource> OpenVideoFile(const std::string& path, const SourceOptions& options);
 // Device /dev/video<index> (V4L2). Frames are numbered as they come.
 std::unique_ptr<FrameSource> OpenDevice(const std::string& index, const SourceOptions& options);

@@ -1,9 +1,9 @@
-// TUM RGB-D sequences: rgb.txt and depth.txt (`time file`), groundtruth.txt (`time tx ty tz qx qy qz qw`, of the
-// colour camera), times in seconds.
+// TUM RGB-D sequences: rgb.txt and depth.txt (`time file`), groundtruth.txt (`time tx ty tz qx qy qz qw`, of
+// the colour camera), times in seconds.
 //
-// The format has no place for a calibration. It is taken from the first of: --camera; calibration.yaml or camera.yaml
-// in the folder; the folder's README where it says `fx=... fy=... cx=... cy=...` and `factor N` (counts per metre) or
-// millimetres; the values that the TUM tools take for any Kinect.
+// The format has no place for a calibration. It is taken from the first of: --camera; calibration.yaml or
+// camera.yaml in the folder; the folder's README where it says `fx=... fy=... cx=... cy=...` and `factor N`
+// (counts per metre) or millimetres; the values that the TUM tools take for any Kinect.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -43,14 +43,16 @@ std::vector<TimedFile> ReadFileTable(const fs::path& folder, const std::string& 
     }
     files.push_back({utime_us, path});
   }
-  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
+  std::stable_sort(files.begin(), files.end(),
+                   [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
   return files;
 }
 
 // Index of the file nearest in time (the earlier of two as near) in the non-empty, ordered list.
 size_t Nearest(const std::vector<TimedFile>& files, int64_t utime_us) {
-  const auto after = std::lower_bound(files.begin(), files.end(), utime_us,
-                                      [](const TimedFile& file, int64_t time) { return file.utime_us < time; });
+  const auto after =
+      std::lower_bound(files.begin(), files.end(), utime_us,
+                       [](const TimedFile& file, int64_t time) { return file.utime_us < time; });
   if (after == files.begin()) {
     return 0;
   }
@@ -60,7 +62,8 @@ size_t Nearest(const std::vector<TimedFile>& files, int64_t utime_us) {
 }
 
 // Pairs of images that are each other's nearest and at most kMaxPairGapUs apart; so none is used twice.
-std::vector<std::pair<size_t, size_t>> Associate(const std::vector<TimedFile>& color, const std::vector<TimedFile>& depth) {
+std::vector<std::pair<size_t, size_t>> Associate(const std::vector<TimedFile>& color,
+                                                 const std::vector<TimedFile>& depth) {
   std::vector<std::pair<size_t, size_t>> pairs;
   for (size_t i = 0; i < color.size(); ++i) {
     const size_t j = Nearest(depth, color[i].utime_us);
@@ -90,7 +93,8 @@ void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording)
     recording.depth_paths.push_back(depth[j].path);
   }
   if (paths.empty()) {
-    throw InputError("folder " + folder.string() + ": no colour image has a depth image within 20 ms: check rgb.txt and depth.txt");
+    throw InputError("folder " + folder.string() +
+                     ": no colour image has a depth image within 20 ms: check rgb.txt and depth.txt");
   }
   if (paths.size() < color.size()) {
     recording.notes.push_back(std::to_string(color.size() - paths.size()) +
@@ -110,7 +114,8 @@ std::string FindReadme(const fs::path& folder) {
 
 std::string Describe(const PinholeCamera& camera) {
   std::ostringstream text;
-  text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px << " px";
+  text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px
+       << " px";
   return text.str();
 }
 
@@ -132,9 +137,11 @@ void CalibrateFromFolder(const fs::path& folder, const SourceOptions& options, R
     rig.left = *camera;
     recording.notes.push_back("The calibration is taken from " + readme + ": " + Describe(rig.left) + ".");
   } else {
-    rig.left = {.width_px = 640, .height_px = 480, .fx_px = 525.0, .fy_px = 525.0, .cx_px = 319.5, .cy_px = 239.5};
-    recording.notes.push_back("Warning: " + folder.string() + " says nothing of its camera; " + Describe(rig.left) +
-                              " is assumed, as for any Kinect: give --camera FILE.yaml or put calibration.yaml there.");
+    rig.left = {
+        .width_px = 640, .height_px = 480, .fx_px = 525.0, .fy_px = 525.0, .cx_px = 319.5, .cy_px = 239.5};
+    recording.notes.push_back(
+        "Warning: " + folder.string() + " says nothing of its camera; " + Describe(rig.left) +
+        " is assumed, as for any Kinect: give --camera FILE.yaml or put calibration.yaml there.");
   }
   if (options.sensor != SensorType::kRgbd || rig.depth_unit_m > 0.0 || options.depth_unit_m > 0.0) {
     return;
@@ -145,7 +152,8 @@ void CalibrateFromFolder(const fs::path& folder, const SourceOptions& options, R
     rig.depth_unit_m = 1.0 / 5000.0;
   }
   std::ostringstream note;
-  note << (is_known ? "The depth unit is taken from " + readme + ": " : "Warning: the depth unit of the TUM sets is assumed: ")
+  note << (is_known ? "The depth unit is taken from " + readme + ": "
+                    : "Warning: the depth unit of the TUM sets is assumed: ")
        << "1/" << 1.0 / rig.depth_unit_m << " m per count.";
   recording.notes.push_back(note.str());
 }

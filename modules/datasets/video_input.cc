@@ -25,7 +25,8 @@ VideoInput VideoInput::OpenFile(const std::string& path) {
   }
   auto impl = std::make_unique<Impl>();
   if (!impl->capture.open(path)) {
-    throw InputError("video " + path + " can't be opened: it is damaged or of a format that OpenCV does not read");
+    throw InputError("video " + path +
+                     " can't be opened: it is damaged or of a format that OpenCV does not read");
   }
   return VideoInput(std::move(impl));
 }
@@ -33,8 +34,9 @@ VideoInput VideoInput::OpenFile(const std::string& path) {
 VideoInput VideoInput::OpenDevice(int index, int width_px, int height_px) {
   auto impl = std::make_unique<Impl>();
   if (!impl->capture.open(index, cv::CAP_V4L2)) {
-    throw InputError("camera /dev/video" + std::to_string(index) +
-                     " can't be opened: check that it is plugged in, not in use, and that you may read it (group video)");
+    throw InputError(
+        "camera /dev/video" + std::to_string(index) +
+        " can't be opened: check that it is plugged in, not in use, and that you may read it (group video)");
   }
   if (width_px > 0 && height_px > 0) {
     impl->capture.set(cv::CAP_PROP_FRAME_WIDTH, width_px);

@@ -64,7 +64,7 @@ Json ToJson(const std::optional<Statistics>& statistics) {
 
 // The measurements of all frames that have them.
 std::optional<Statistics> SummarizeFrames(const std::vector<FrameRecord>& frames,
-                                          std::optional<double> FrameRecord::*measurement) {
+                                          std::optional<double> FrameRecord::* measurement) {
   std::vector<double> values;
   for (const FrameRecord& frame : frames) {
     if (const std::optional<double>& value = frame.*measurement) {
@@ -85,7 +85,8 @@ void WriteFile(const std::string& path, const std::string& text) {
     file.close();
     if (!file) {
       std::filesystem::remove(beside, error);
-      throw InputError("file " + path + " can't be written: check the folder, its permissions and the space on the disk");
+      throw InputError("file " + path +
+                       " can't be written: check the folder, its permissions and the space on the disk");
     }
   }
   std::filesystem::rename(beside, path, error);
@@ -100,10 +101,10 @@ std::string FramesCsv(const RunRecord& record) {
   for (const FrameRecord& frame : record.Frames()) {
     const PoseEstimate& pose = frame.pose;
     char row[256];
-    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%d,%d,%d,%d,%d\n", pose.frame.value, pose.utime_us,
-                  StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
-                  MillisecondsText(frame.latency_ms).c_str(), pose.num_features, pose.num_matches, pose.num_inliers,
-                  pose.num_landmarks, pose.is_keyframe ? 1 : 0);
+    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%d,%d,%d,%d,%d\n", pose.frame.value,
+                  pose.utime_us, StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
+                  MillisecondsText(frame.latency_ms).c_str(), pose.num_features, pose.num_matches,
+                  pose.num_inliers, pose.num_landmarks, pose.is_keyframe ? 1 : 0);
     text += row;
   }
   return text;

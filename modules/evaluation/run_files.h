@@ -11,15 +11,16 @@ namespace tessera {
 // Throws InputError if it can't be written.
 void WriteFile(const std::string& path, const std::string& text);
 
-// Columns: frame, utime_us, state, pose_time_ms, latency_ms, features, matches, inliers, landmarks, is_keyframe.
-// What is unknown is empty.
+// Columns: frame, utime_us, state, pose_time_ms, latency_ms, features, matches, inliers, landmarks,
+// is_keyframe. What is unknown is empty.
 std::string FramesCsv(const RunRecord& record);
 
 // The figures of the run (INTERFACE: `summary.json` is made of them), as JSON.
 std::string RunJson(const RunRecord& record);
 
-// Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, ground_truth.txt, frames.csv and, at
-// the very end, run.json into the folder, which is made if need be. Throws InputError if one can't be written.
+// Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, ground_truth.txt,
+// frames.csv and, at the very end, run.json into the folder, which is made if need be. Throws InputError if
+// one can't be written.
 void WriteRun(const RunRecord& record, const std::string& folder);
 
 }  // namespace tessera

@@ -8,8 +8,8 @@ namespace tessera {
 namespace {
 
 void AddPoseBits(const Rigid3& pose, Sha256& hash) {
-  for (const double number : {pose.translation.x(), pose.translation.y(), pose.translation.z(), pose.rotation.x(),
-                              pose.rotation.y(), pose.rotation.z(), pose.rotation.w()}) {
+  for (const double number : {pose.translation.x(), pose.translation.y(), pose.translation.z(),
+                              pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.rotation.w()}) {
     hash.Add(number);
   }
 }
@@ -32,7 +32,9 @@ std::string HashKeyframe(const KeyframeObservation& keyframe) {
 
 }  // namespace
 
-void RunRecord::AddPose(const PoseEstimate& pose, int64_t publish_us) { poses_.try_emplace(pose.frame, pose, publish_us); }
+void RunRecord::AddPose(const PoseEstimate& pose, int64_t publish_us) {
+  poses_.try_emplace(pose.frame, pose, publish_us);
+}
 
 void RunRecord::AddKeyframe(const KeyframeObservation& keyframe) {
   // The features themselves are not kept: a long run has more of them than memory.
@@ -96,13 +98,15 @@ FrameCounts RunRecord::Counts() const {
   return counts;
 }
 
-int64_t RunRecord::num_landmarks() const { return poses_.empty() ? 0 : poses_.rbegin()->second.estimate.num_landmarks; }
+int64_t RunRecord::num_landmarks() const {
+  return poses_.empty() ? 0 : poses_.rbegin()->second.estimate.num_landmarks;
+}
 
 StampedPose RunRecord::FinalPose(const PoseEstimate& estimate) const {
   const auto reference = keyframes_.find(estimate.reference_keyframe);
-  const Rigid3 world_from_camera = reference == keyframes_.end()
-                                       ? estimate.world_from_camera
-                                       : reference->second.pose.world_from_camera * estimate.reference_from_camera;
+  const Rigid3 world_from_camera = reference == keyframes_.end() ? estimate.world_from_camera
+                                                                 : reference->second.pose.world_from_camera *
+                                                                       estimate.reference_from_camera;
   return {estimate.frame, estimate.utime_us, world_from_camera};
 }
 
@@ -130,7 +134,7 @@ std::vector<Rigid3> RunRecord::PosePerFrame() const {
   if (poses_.empty()) {
     return {};
   }
-  // Frames are numbered without gaps up to the end, so that the number of frames tells the first one's number.
+  // Frames are numbered without gaps up to the end, so that their count tells the first one's number.
   const int64_t end = std::max(end_num_frames_.value_or(0), poses_.rbegin()->first.value + 1);
   const int64_t first = std::clamp<int64_t>(end - Counts().frames, 0, poses_.begin()->first.value);
   std::vector<Rigid3> rows;

@@ -1,5 +1,5 @@
-// What is known of a run: every pose, keyframe and true pose, and the figures of the stages. All that a run's folder
-// tells is derived from it.
+// What is known of a run: every pose, keyframe and true pose, and the figures of the stages. All that a run's
+// folder tells is derived from it.
 #pragma once
 
 #include <cstdint>
@@ -27,15 +27,15 @@ struct FrameRecord {
   PoseEstimate pose;
   int64_t publish_us = 0;              // wall clock at which the pose was published
   std::optional<double> pose_time_ms;  // since the pose before it was published; none for the first
-  std::optional<double> latency_ms;    // since the dispatcher first heard of the frame; none if that is unknown
+  std::optional<double> latency_ms;  // since the dispatcher first heard of the frame; none if that is unknown
 };
 
 struct FrameCounts {
-  int64_t frames = 0;         // of the source, as far as is known: those with a pose message, and the dropped ones
+  int64_t frames = 0;  // of the source, as far as is known: those with a pose message, and the dropped ones
   int64_t tracked = 0;
-  int64_t initializing = 0;   // without a pose, before the first that has one
-  int64_t lost = 0;           // without a pose, after it
-  int64_t dropped = 0;        // never reached the tracker
+  int64_t initializing = 0;       // without a pose, before the first that has one
+  int64_t lost = 0;               // without a pose, after it
+  int64_t dropped = 0;            // never reached the tracker
   int64_t tracking_failures = 0;  // changes from tracked to lost
 };
 
@@ -73,8 +73,8 @@ class RunRecord {
   std::vector<StampedPose> Trajectory() const;
   // Tracked frames as they were published at the time.
   std::vector<StampedPose> LiveTrajectory() const;
-  // One pose for every frame of the source: a frame without one takes the last before it; before the first, the
-  // origin of the world.
+  // One pose for every frame of the source: a frame without one takes the last before it; before the first,
+  // the origin of the world.
   std::vector<Rigid3> PosePerFrame() const;
   std::vector<StampedPose> Keyframes() const;
   std::vector<StampedPose> GroundTruth() const;

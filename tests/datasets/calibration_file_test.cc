@@ -19,10 +19,12 @@ TEST(CalibrationFile, ShippedFilesLoad) {
 
 TEST(CalibrationFile, ReadsEveryKey) {
   const DatasetFolder folder;
-  folder.Write("c.yaml", std::string(kPinhole) +
-                             "width_px: 640\nheight_px: 480\ndistortion: [0.1, -0.2, 1e-3, 2e-3, 0.05]\ndepth_unit_m: 0.001\n"
-                             "right:\n  fx_px: 410\n  fy_px: 411\n  cx_px: 321\n  cy_px: 241\n"
-                             "  right_from_left: [1, 0, 0, -0.25, 0, 0, 1, 0.5, 0, -1, 0, 0.75]\n");
+  folder.Write(
+      "c.yaml",
+      std::string(kPinhole) +
+          "width_px: 640\nheight_px: 480\ndistortion: [0.1, -0.2, 1e-3, 2e-3, 0.05]\ndepth_unit_m: 0.001\n"
+          "right:\n  fx_px: 410\n  fy_px: 411\n  cx_px: 321\n  cy_px: 241\n"
+          "  right_from_left: [1, 0, 0, -0.25, 0, 0, 1, 0.5, 0, -1, 0, 0.75]\n");
   const CameraRig rig = LoadCalibrationFile(folder.path("c.yaml"));
   EXPECT_EQ(rig.left.width_px, 640);
   EXPECT_EQ(rig.left.height_px, 480);
@@ -67,9 +69,12 @@ TEST(CalibrationFile, BadFilesGetASentence) {
   expect(std::string(kPinhole) + "baseline_m: -1\n", "`baseline_m`");
   expect(std::string(kPinhole) + "depth_unit_m: -1\n", "`depth_unit_m`");
   expect(std::string(kPinhole) + "baseline_m: 1\nright: {}\n", "exclude each other");
-  expect(std::string(kPinhole) + "right:\n  fx_px: 1\n  fy_px: 1\n  cx_px: 1\n  cy_px: 1\n", "`right.right_from_left` is missing");
-  expect(std::string(kPinhole) + "right:\n  fx_px: 1\n  fy_px: 1\n  cx_px: 1\n  cy_px: 1\n"
-                                 "  right_from_left: [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0]\n", "rotation");
+  expect(std::string(kPinhole) + "right:\n  fx_px: 1\n  fy_px: 1\n  cx_px: 1\n  cy_px: 1\n",
+         "`right.right_from_left` is missing");
+  expect(std::string(kPinhole) +
+             "right:\n  fx_px: 1\n  fy_px: 1\n  cx_px: 1\n  cy_px: 1\n"
+             "  right_from_left: [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0]\n",
+         "rotation");
 }
 
 }  // namespace

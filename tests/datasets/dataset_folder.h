@@ -37,7 +37,9 @@ class DatasetFolder {
     std::ifstream file(path(name), std::ios::binary);
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   }
-  void Truncate(const std::string& name, size_t num_bytes) const { Write(name, Read(name).substr(0, num_bytes)); }
+  void Truncate(const std::string& name, size_t num_bytes) const {
+    Write(name, Read(name).substr(0, num_bytes));
+  }
 
   // A grey image whose pixels tell where they are and which image it is.
   static cv::Mat Pattern(int width, int height, int seed) {

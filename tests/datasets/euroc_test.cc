@@ -18,7 +18,8 @@ Rigid3 WorldFromBody(int64_t time_ns) {
 
 class EurocTest : public testing::Test {
  protected:
-  // Four frames; cam0 lacks none, cam1 lacks the second and has one more; poses at 200 Hz that miss the frames' times.
+  // Four frames; cam0 lacks none, cam1 lacks the second and has one more; poses at 200 Hz that miss the
+  // frames' times.
   EurocTest() {
     body_from_left_ = {ExpSO3({0.3, -0.2, 1.5}), {0.1, 0.2, -0.05}};
     body_from_right_ = body_from_left_ * Rigid3{ExpSO3({0.01, 0.0, 0.005}), {0.11, 0.001, 0.0}};
@@ -45,11 +46,13 @@ class EurocTest : public testing::Test {
       std::snprintf(number, sizeof number, "%.15f, ", m(i / 4, i % 4));
       transform += number;
     }
-    folder_.Write("mav0/" + camera + "/sensor.yaml",
-                  "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [" + transform +
-                      "0.0, 0.0, 0.0, 1.0]\nresolution: [80, 60]\ncamera_model: pinhole\n"
-                      "intrinsics: [60.0, 61.0, 40.0, 30.0] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
-                      "distortion_coefficients: [" + (distortion.empty() ? "-0.2, 0.05, 0.0002, 0.0001" : distortion) + "]\n");
+    folder_.Write(
+        "mav0/" + camera + "/sensor.yaml",
+        "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [" + transform +
+            "0.0, 0.0, 0.0, 1.0]\nresolution: [80, 60]\ncamera_model: pinhole\n"
+            "intrinsics: [60.0, 61.0, 40.0, 30.0] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
+            "distortion_coefficients: [" +
+            (distortion.empty() ? "-0.2, 0.05, 0.0002, 0.0001" : distortion) + "]\n");
     std::string rows = "#timestamp [ns],filename\r\n";
     for (const int frame : frames) {
       const std::string name = std::to_string(kStartNs + frame * kFrameNs);
@@ -128,6 +131,13 @@ TEST_F(EurocTest, BadFilesAreRefused) {
   Replace(sensor, "intrinsics: [60.0, ", "intrinsics: [");
   ExpectRefused({folder_.path(sensor), "`intrinsics`"});
   folder_.Write(sensor, good_sensor);
+  Replace(sensor, "resolution: [80", "resolution: [.nan");
+  ExpectRefused({folder_.path(sensor), "`resolution`"});
+  folder_.Write(sensor, good_sensor);
+  Replace(sensor, "data: [", "data: [.nan, ");
+  Replace(sensor, ", 1.0]", "]");
+  ExpectRefused({folder_.path(sensor), "rotation"});
+  folder_.Write(sensor, good_sensor);
   Replace(sensor, "T_BS", "T_BX");
   ExpectRefused({folder_.path(sensor), "`T_BS`"});
   folder_.Write(sensor, "cam: [");
@@ -147,7 +157,8 @@ TEST_F(EurocTest, BadFilesAreRefused) {
 }
 
 TEST_F(EurocTest, ImagesOfAnotherSizeThanTheCalibrationAreRefused) {
-  folder_.WriteImage("mav0/cam0/data/" + std::to_string(kStartNs) + ".png", DatasetFolder::Pattern(70, 60, 0));
+  folder_.WriteImage("mav0/cam0/data/" + std::to_string(kStartNs) + ".png",
+                     DatasetFolder::Pattern(70, 60, 0));
   ExpectRefused({std::to_string(kStartNs) + ".png", "70x60", "80x60"});
 }
 

@@ -25,7 +25,8 @@ TEST(ImageFile, RefusesEveryTruncatedJpegAndPng) {
       ExpectInputError([&] { ReadGrayImage(folder.path(name)); }, {folder.path(name)});
     }
     folder.Write(name, whole.substr(0, whole.size() - 1));
-    ExpectInputError([&] { ReadGrayImage(folder.path(name)); }, {folder.path(name), "truncated", "copy it again"});
+    ExpectInputError([&] { ReadGrayImage(folder.path(name)); },
+                     {folder.path(name), "truncated", "copy it again"});
   }
 }
 

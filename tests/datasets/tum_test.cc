@@ -17,14 +17,16 @@ class TumTest : public testing::Test {
       cv::Mat bgr;
       cv::merge(std::vector<cv::Mat>{gray, gray, gray}, bgr);
       folder_.WriteImage("rgb/" + color[i] + ".png", bgr);
-      folder_.WriteImage("depth/" + depth[i] + ".png", cv::Mat(480, 640, CV_16U, cv::Scalar(1000.0 + static_cast<double>(i))));
+      folder_.WriteImage("depth/" + depth[i] + ".png",
+                         cv::Mat(480, 640, CV_16U, cv::Scalar(1000.0 + static_cast<double>(i))));
       rgb_table += color[i] + " rgb/" + color[i] + ".png\n";
       depth_table += depth[i] + " depth/" + depth[i] + ".png\n";
     }
     folder_.Write("rgb.txt", rgb_table);
     folder_.Write("depth.txt", depth_table);
-    folder_.Write("groundtruth.txt", "# t tx ty tz qx qy qz qw\n999.990 0 0 0 0 0 0 1\n1000.010 2 4 0 0 0 0 1\n"
-                                     "1000.033 5 6 7 0.6 0 0 0.8\n1000.5 0 0 0 0 0 0 1\n");
+    folder_.Write("groundtruth.txt",
+                  "# t tx ty tz qx qy qz qw\n999.990 0 0 0 0 0 0 1\n1000.010 2 4 0 0 0 0 1\n"
+                  "1000.033 5 6 7 0.6 0 0 0.8\n1000.5 0 0 0 0 0 0 1\n");
   }
   SourceOptions Options(SensorType sensor = SensorType::kRgbd) {
     SourceOptions options;
@@ -78,11 +80,14 @@ TEST_F(TumTest, FallsBackOnTheUsualKinectWithAWarning) {
 }
 
 TEST_F(TumTest, TakesTheCalibrationFromReadmeThenFileThenOption) {
-  folder_.Write("README", "RGB-D, depth in millimetres (factor 1000; the TUM sets use 5000), pinhole fx=fy=585 cx=320 cy=240.");
+  folder_.Write(
+      "README",
+      "RGB-D, depth in millimetres (factor 1000; the TUM sets use 5000), pinhole fx=fy=585 cx=320 cy=240.");
   auto source = OpenSource(Options());
   EXPECT_EQ(source->calibration().fy_px, 585.0);
   EXPECT_EQ(source->calibration().depth_unit_m, 0.001);
-  EXPECT_NE(Joined(source->notes()).find(folder_.path("README") + ": fx=585 fy=585 cx=320 cy=240"), std::string::npos);
+  EXPECT_NE(Joined(source->notes()).find(folder_.path("README") + ": fx=585 fy=585 cx=320 cy=240"),
+            std::string::npos);
   EXPECT_EQ(Joined(source->notes()).find("Warning"), std::string::npos);
 
   folder_.Write("calibration.yaml", "fx_px: 500\nfy_px: 500\ncx_px: 320\ncy_px: 240\ndepth_unit_m: 0.002\n");

@@ -67,13 +67,15 @@ class RunFilesTest : public testing::Test {
 TEST(PoseText, TumRowHasTheTimeToTheMicrosecond) {
   const Rigid3 pose{Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1.0, -2.5, 1e-9}};
   EXPECT_EQ(TumRow(1'403'636'584'763'555, pose),
-            "1403636584.763555 1.000000000 -2.500000000 0.000000001 -0.500000000 0.500000000 0.500000000 0.500000000\n");
+            "1403636584.763555 1.000000000 -2.500000000 0.000000001 -0.500000000 0.500000000 0.500000000 "
+            "0.500000000\n");
   EXPECT_EQ(TumRow(3, {}).substr(0, 9), "0.000003 ");
   EXPECT_EQ(TumRow(-1'500'000, {}).substr(0, 10), "-1.500000 ");
 }
 
 TEST(PoseText, KittiRowIsTheMatrixRowByRow) {
-  const Rigid3 pose{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ())), {1.0, 2.0, 3.0}};
+  const Rigid3 pose{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ())),
+                    {1.0, 2.0, 3.0}};
   double numbers[12];
   std::istringstream row(KittiRow(pose));
   for (double& number : numbers) {
@@ -95,15 +97,17 @@ TEST_F(RunFilesTest, WritesAllFilesAndLeavesNothingBeside) {
     names.push_back(entry.path().filename());
   }
   std::sort(names.begin(), names.end());
-  EXPECT_EQ(names, (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "run.json",
-                                             "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "run.json",
+                                      "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
 }
 
 TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {
   WriteRun(SmallRun(), folder_);
   EXPECT_EQ(Read("trajectory.txt"),
             "# timestamp tx ty tz qx qy qz qw\n"
-            "1403636584.763556 0.250000000 -1.000000000 2.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n");
+            "1403636584.763556 0.250000000 -1.000000000 2.000000000 0.000000000 0.000000000 0.000000000 "
+            "1.000000000\n");
   EXPECT_EQ(Read("trajectory_live.txt"), Read("trajectory.txt"));
   const std::string kitti = Read("trajectory_kitti.txt"), truth = Read("ground_truth.txt");
   EXPECT_EQ(std::count(kitti.begin(), kitti.end(), '\n'), 3);

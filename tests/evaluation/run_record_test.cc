@@ -44,8 +44,8 @@ RunRecord RecordOf(const std::vector<TrackingState>& states, int64_t first_frame
 }
 
 TEST(RunRecord, CountsFramesByWhatBecameOfThem) {
-  RunRecord record =
-      RecordOf({kInitializing, kInitializing, kTracked, kLost, kLost, kTracked, kTracked, kLost, kInitializing});
+  RunRecord record = RecordOf(
+      {kInitializing, kInitializing, kTracked, kLost, kLost, kTracked, kTracked, kLost, kInitializing});
   record.SetEnd(12, 3);
   const FrameCounts counts = record.Counts();
   EXPECT_EQ(counts.frames, 12);
@@ -83,7 +83,8 @@ TEST(RunRecord, FinalPosesFollowTheirKeyframes) {
   record.AddPose(pose, 1);
   record.AddPose(Pose(4, kTracked, 6.0), 2);  // without a reference: stays as it was
   KeyframeObservation keyframe = Keyframe(1, 2, 10.0);
-  keyframe.world_from_camera.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitY()));
+  keyframe.world_from_camera.rotation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitY()));
   record.AddKeyframe(keyframe);
   const std::vector<StampedPose> trajectory = record.Trajectory();
   ASSERT_EQ(trajectory.size(), 2U);

@@ -1,5 +1,5 @@
-// Wiring of the camera: a source of frames on one side, CALIBRATION, GROUND_TRUTH, CAMERA and END_OF_STREAM on the
-// other. One frame is read ahead, so that decoding it delays nobody.
+// Wiring of the camera: a source of frames on one side, CALIBRATION, GROUND_TRUTH, CAMERA and END_OF_STREAM
+// on the other. One frame is read ahead, so that decoding it delays nobody.
 #pragma once
 
 #include <cstdint>

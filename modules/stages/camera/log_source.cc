@@ -24,7 +24,8 @@ class LogSource : public FrameSource {
 
  private:
   bool IsWanted(FrameId frame) const {
-    return frame.value >= options_.first_frame && (options_.last_frame < 0 || frame.value < options_.last_frame);
+    return frame.value >= options_.first_frame &&
+           (options_.last_frame < 0 || frame.value < options_.last_frame);
   }
   std::optional<CameraFrame> ReadFrame();
   void CheckOptions() const;
@@ -50,11 +51,13 @@ void LogSource::ReadUntilCalibrated() {
   while (!calibration_ || read_ahead_.empty()) {
     std::optional<CameraFrame> frame = ReadFrame();
     if (!calibration_ && (!frame || read_ahead_.size() == kMaxFramesBeforeCalibration)) {
-      throw InputError(options_.source + " has no CALIBRATION with its first frames: record the camera from its start");
+      throw InputError(options_.source +
+                       " has no CALIBRATION with its first frames: record the camera from its start");
     }
     if (!frame) {
-      throw InputError(options_.source + " has no frames in the range " + std::to_string(options_.first_frame) + ":" +
-                       (options_.last_frame < 0 ? "" : std::to_string(options_.last_frame)) + ": choose another range");
+      throw InputError(
+          options_.source + " has no frames in the range " + std::to_string(options_.first_frame) + ":" +
+          (options_.last_frame < 0 ? "" : std::to_string(options_.last_frame)) + ": choose another range");
     }
     read_ahead_.push_back(std::move(*frame));
   }
@@ -62,18 +65,21 @@ void LogSource::ReadUntilCalibrated() {
 
 void LogSource::CheckOptions() const {
   if (!options_.calibration_path.empty() || options_.depth_unit_m > 0.0) {
-    throw InputError(options_.source + " has its calibration in it, and its images are rectified by it: leave out --camera and camera.depth_unit_m");
+    throw InputError(options_.source +
+                     " has its calibration in it, and its images are rectified by it: leave out --camera and "
+                     "camera.depth_unit_m");
   }
   if (options_.first_frame < 0 || (options_.last_frame >= 0 && options_.last_frame <= options_.first_frame)) {
-    throw InputError("frames " + std::to_string(options_.first_frame) + ":" + std::to_string(options_.last_frame) +
-                     " are none: choose another range");
+    throw InputError("frames " + std::to_string(options_.first_frame) + ":" +
+                     std::to_string(options_.last_frame) + " are none: choose another range");
   }
 }
 
 void LogSource::Take(const CameraCalibration& recorded) {
   if (options_.sensor != SensorType::kMono && recorded.sensor != options_.sensor) {
-    throw InputError(options_.source + " was recorded with --sensor " + ToString(recorded.sensor) + " and can't serve --sensor " +
-                     ToString(options_.sensor) + ": give what it was recorded with, or mono");
+    throw InputError(options_.source + " was recorded with --sensor " + ToString(recorded.sensor) +
+                     " and can't serve --sensor " + ToString(options_.sensor) +
+                     ": give what it was recorded with, or mono");
   }
   calibration_ = recorded;
   if (options_.sensor == SensorType::kMono) {
@@ -90,9 +96,11 @@ std::optional<int64_t> LogSource::num_frames() const {
 
 std::optional<CameraFrame> LogSource::ReadFrame() {
   while (std::optional<LoggedValue> value = reader_.Next()) {
-    if (const auto* calibration = std::get_if<CameraCalibration>(&*value); calibration != nullptr && !calibration_) {
+    if (const auto* calibration = std::get_if<CameraCalibration>(&*value);
+        calibration != nullptr && !calibration_) {
       Take(*calibration);
-    } else if (const auto* truth = std::get_if<GroundTruthPose>(&*value); truth != nullptr && IsWanted(truth->frame)) {
+    } else if (const auto* truth = std::get_if<GroundTruthPose>(&*value);
+               truth != nullptr && IsWanted(truth->frame)) {
       ground_truth_.push_back(*truth);
     } else if (auto* frame = std::get_if<CameraFrame>(&*value); frame != nullptr && IsWanted(frame->id)) {
       return std::move(*frame);

@@ -17,8 +17,10 @@ PacerOptions ParsePace(const std::string& text) {
     return options;
   }
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), options.speed);
-  if (error != std::errc() || stop != text.data() + text.size() || !(options.speed > 0.0) || !std::isfinite(options.speed)) {
-    throw InputError("pace `" + text + "` is not known: give lockstep, realtime or a speed factor above 0, such as 0.5");
+  if (error != std::errc() || stop != text.data() + text.size() || !(options.speed > 0.0) ||
+      !std::isfinite(options.speed)) {
+    throw InputError("pace `" + text +
+                     "` is not known: give lockstep, realtime or a speed factor above 0, such as 0.5");
   }
   return options;
 }
@@ -36,7 +38,8 @@ bool Pacer::MayGo(int64_t utime_us, int64_t now_us) {
     start_ = Start{utime_us, now_us};
   }
   // due - start = (utime - first utime) / speed
-  return static_cast<double>(now_us - start_->now_us) * options_.speed >= static_cast<double>(utime_us - start_->utime_us);
+  return static_cast<double>(now_us - start_->now_us) * options_.speed >=
+         static_cast<double>(utime_us - start_->utime_us);
 }
 
 void Pacer::MarkSent(FrameId frame) {

@@ -18,7 +18,7 @@ struct PacerOptions {
   };
   Kind kind = Kind::kLockstep;
   double speed = 1.0;       // kTimed: seconds of the source in one second of the clock
-  int lockstep_window = 6;  // kLockstep: frames sent and not yet tracked; enough that no stage ever waits for work
+  int lockstep_window = 6;  // kLockstep: frames sent and not yet tracked; enough to keep every stage busy
 };
 
 // "lockstep", "realtime", or a speed factor > 0 such as "0.5". Throws InputError.
@@ -28,7 +28,7 @@ class Pacer {
  public:
   explicit Pacer(const PacerOptions& options) : options_(options) {}
 
-  // Whether the frame that was taken at `utime_us` may go. The first frame asked about starts the clock of kTimed.
+  // Whether the frame that was taken at `utime_us` may go. The first one asked about starts kTimed's clock.
   bool MayGo(int64_t utime_us, int64_t now_us);
   void MarkSent(FrameId frame);
   // This frame, and all before it, have a pose.

@@ -33,7 +33,8 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
     std::error_code error;
     std::filesystem::create_directories(out_dir_, error);
     if (error) {
-      throw InputError("evaluator.out_dir " + out_dir_ + " can't be made: " + error.message() + "; choose another folder");
+      throw InputError("evaluator.out_dir " + out_dir_ + " can't be made: " + error.message() +
+                       "; choose another folder");
     }
   }
   context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo& info) {
@@ -42,12 +43,12 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
     last_news_us_ = context_.now_us();
     FinishIfDone();
   });
-  context.Subscribe<KeyframeObservation>(kKeyframeChannel, [this](const KeyframeObservation& keyframe, const MessageInfo&) {
-    record_.AddKeyframe(keyframe);
-  });
-  context.Subscribe<GroundTruthPose>(kGroundTruthChannel, [this](const GroundTruthPose& truth, const MessageInfo&) {
-    record_.AddGroundTruth(truth);
-  });
+  context.Subscribe<KeyframeObservation>(
+      kKeyframeChannel,
+      [this](const KeyframeObservation& keyframe, const MessageInfo&) { record_.AddKeyframe(keyframe); });
+  context.Subscribe<GroundTruthPose>(
+      kGroundTruthChannel,
+      [this](const GroundTruthPose& truth, const MessageInfo&) { record_.AddGroundTruth(truth); });
   context.Subscribe<EndOfStream>(kEndOfStreamChannel,
                                  [this](const EndOfStream& end, const MessageInfo&) { OnEnd(end); });
   context.Subscribe<StageStatus>(kStatusChannel,

@@ -1,4 +1,5 @@
-// Wiring of the evaluator: what the stages say goes into a RunRecord, which is written once the run has ended.
+// Wiring of the evaluator: what the stages say goes into a RunRecord, which is written once the run has
+// ended.
 #pragma once
 
 #include <cstdint>
