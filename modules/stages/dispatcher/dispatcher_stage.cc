@@ -14,11 +14,6 @@ constexpr size_t kMaxFramesBeforeCalibration = 16;
 // After the source's end, a frame that has not come for this long won't come any more.
 constexpr int64_t kLastFrameTimeoutUs = 5'000'000;
 
-int64_t NowUs() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
 WorkQueueOptions OptionsFrom(const Settings& settings) {
   WorkQueueOptions options;
   options.grid = ParseTileGrid(settings.Get<std::string>("dispatcher.tiles"));
@@ -48,7 +43,7 @@ DispatcherStage::DispatcherStage(StageContext& context)
   context.Subscribe<CameraFrame>(
       kCameraChannel, [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
   context.Subscribe<ExtractorReady>(kExtractorReadyChannel, [this](const ExtractorReady& ready, const MessageInfo&) {
-    queue_.HearExtractor(ready.extractor, ready.epoch_us, NowUs());
+    queue_.HearExtractor(ready.extractor, ready.epoch_us, context_.now_us());
     GiveWork();
   });
   context.Subscribe<TileAck>(kTileAckChannel, [this](const TileAck& ack, const MessageInfo&) {
@@ -62,7 +57,7 @@ DispatcherStage::DispatcherStage(StageContext& context)
   context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
     if (end.stage == "camera" && !source_end_) {
       source_end_ = end;
-      last_activity_us_ = NowUs();
+      last_activity_us_ = context_.now_us();
       FinishIfDone();
     }
   });
@@ -86,7 +81,7 @@ void DispatcherStage::OnCalibration(const CameraCalibration& calibration) {
 }
 
 void DispatcherStage::OnFrame(const CameraFrame& frame, const MessageInfo& info) {
-  last_activity_us_ = NowUs();
+  last_activity_us_ = context_.now_us();
   if (frame.id <= newest_) {
     context_.ReportError("frame " + std::to_string(frame.id.value) + " came after frame " +
                          std::to_string(newest_.value) + " and is ignored: is there a second camera?");
@@ -134,7 +129,7 @@ void DispatcherStage::QueueFrame(const CameraFrame& frame, int64_t arrival_us) {
 void DispatcherStage::GiveWork() {
   while (queue_.CanGive()) {
     const StepTimer timer(context_);
-    const auto [extractor, job] = queue_.GiveNext(NowUs());
+    const auto [extractor, job] = queue_.GiveNext(context_.now_us());
     if (!tiles_.contains(extractor)) {
       tiles_[extractor] = context_.Advertise<TileJob>(TileChannel(extractor));
     }
@@ -145,7 +140,7 @@ void DispatcherStage::GiveWork() {
 }
 
 void DispatcherStage::Watch() {
-  queue_.CheckExtractors(NowUs());
+  queue_.CheckExtractors(context_.now_us());
   GiveWork();
   context_.SetValue("extractors", queue_.num_extractors());
   context_.SetValue("jobs_given_again", static_cast<double>(queue_.num_given_again()));
@@ -161,7 +156,7 @@ void DispatcherStage::FinishIfDone() {
     return;
   }
   const bool all_came = newest_.value + 1 >= source_end_->num_frames;
-  if (!all_came && NowUs() - last_activity_us_ < kLastFrameTimeoutUs) {
+  if (!all_came && context_.now_us() - last_activity_us_ < kLastFrameTimeoutUs) {
     return;
   }
   const int64_t num_missing = std::max<int64_t>(0, source_end_->num_frames - (newest_.value + 1));
