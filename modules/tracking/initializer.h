@@ -1,0 +1,58 @@
+// The start of mono: two frames that together give a camera motion and points.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/triangulation.h"
+#include "geometry/two_view.h"
+#include "tracking/frame_view.h"
+#include "tracking/matching.h"
+
+namespace tessera {
+
+struct InitializerOptions {
+  double radius_share = 0.1;  // search window: +- this share of the image's width around the place in the frame before
+  int min_matches = 100;      // with fewer, the reference frame is given up for the newest one
+  int max_frames = 40;        // so is one that is older than this
+  MatchingOptions matching{50, 0.9, true};
+  TwoViewOptions two_view;
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+struct MonoStart {
+  struct Point {
+    int32_t keypoint_first = -1;
+    int32_t keypoint_second = -1;
+    PointRefinement point;  // in the first camera's frame
+  };
+  std::shared_ptr<const FrameView> first;
+  std::shared_ptr<const FrameView> second;
+  Rigid3 second_from_first;  // in units of the points' median depth in the first camera
+  std::vector<Point> points;
+};
+
+class MonoInitializer {
+ public:
+  explicit MonoInitializer(const InitializerOptions& options) : options_(options) {}
+
+  // Matches the frame with the reference frame, and tells the start if the two allow one. The first frame with enough
+  // keypoints becomes the reference; keypoints are followed from frame to frame.
+  std::optional<MonoStart> Add(const std::shared_ptr<const FrameView>& frame);
+
+ private:
+  void SetReference(const std::shared_ptr<const FrameView>& frame);
+  MonoStart MakeStart(const std::shared_ptr<const FrameView>& frame, const std::vector<Match>& matches,
+                      const TwoViewResult& views) const;
+
+  InitializerOptions options_;
+  std::shared_ptr<const FrameView> reference_;
+  std::vector<Eigen::Vector2d> places_px_;  // by keypoint of the reference: where it was seen last
+};
+
+}  // namespace tessera
