@@ -25,6 +25,7 @@ struct Candidate {
   Rigid3 second_from_first;
   std::vector<std::optional<Eigen::Vector3d>> points;
   int num_points = 0;
+  double cost = 0.0;  // see Cost()
 };
 
 Problem MakeProblem(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
@@ -109,8 +110,27 @@ Rigid3 RefineOnInliers(const Problem& problem, Rigid3 motion) {
   return motion;
 }
 
+// Truncated squared errors of all pairs, in units of the limit: how ill the motion explains them. A pair whose point
+// stands behind a camera is not explained. Points that are too far for parallax count like others: the motion that puts
+// most points near is not therefore the true one.
+double Cost(const Problem& problem, const Rigid3& motion) {
+  const Eigen::Matrix3d essential = EssentialFromMotion(motion);
+  double cost = 0.0;
+  for (const RayPair& pair : problem.rays) {
+    const double distance = SampsonDistance(essential, pair);
+    double share = std::min(1.0, distance * distance / problem.limit_squared);
+    if (share < 1.0) {
+      const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
+      const bool is_in_front = point && point->z() > 0.0 && (motion * *point).z() > 0.0;
+      share = is_in_front ? share : 1.0;
+    }
+    cost += share;
+  }
+  return cost;
+}
+
 Candidate Evaluate(const Problem& problem, const Rigid3& motion) {
-  Candidate candidate{motion, {}, 0};
+  Candidate candidate{motion, {}, 0, Cost(problem, motion)};
   candidate.points.reserve(problem.rays.size());
   for (const RayPair& pair : problem.rays) {
     candidate.points.push_back(GoodPoint(problem, motion, pair));
@@ -161,18 +181,18 @@ std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibratio
   const Problem problem = MakeProblem(calibration, pairs, options);
   std::vector<Candidate> candidates;
   for (const Rigid3& motion : PossibleMotions(problem, seed)) {
-    if (Evaluate(problem, motion).num_points * 4 >= options.min_points) {  // else refining cannot save it
-      candidates.push_back(Evaluate(problem, RefineOnInliers(problem, motion)));
-    }
+    candidates.push_back(Evaluate(problem, RefineOnInliers(problem, motion)));
   }
-  const auto best = std::max_element(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
-    return a.num_points < b.num_points;
-  });
+  const auto best = std::min_element(candidates.begin(), candidates.end(),
+                                     [](const auto& a, const auto& b) { return a.cost < b.cost; });
   if (best == candidates.end() || best->num_points < options.min_points) {
     return std::nullopt;
   }
+  const auto num_explained = [&](const Candidate& candidate) {
+    return static_cast<double>(problem.rays.size()) - candidate.cost;
+  };
   for (const Candidate& rival : candidates) {
-    if (rival.num_points > options.max_rival_share * best->num_points &&
+    if (num_explained(rival) > options.max_rival_share * num_explained(*best) &&
         AreDifferent(rival.second_from_first, best->second_from_first)) {
       return std::nullopt;
     }

@@ -23,7 +23,7 @@ struct TwoViewOptions {
   int ransac_iterations = 300;     // samples for each model: 8 good of 8 are met with 99 % at 60 % good matches
   int min_points = 60;             // points with good parallax and small error that a start needs
   double min_parallax_rad = 0.017; // 1 degree: a point's depth is then good to about sigma_px / (f * 0.017) ~ 10 %
-  double max_rival_share = 0.75;   // a different motion that explains more than this share of the points: ambiguous
+  double max_rival_share = 0.75;   // a different motion that explains more than this share of what the best does: ambiguous
 
   // Empty if all is well, else one sentence.
   std::string Check() const;
@@ -37,8 +37,10 @@ struct TwoViewResult {
 
 // Samples essential matrices (any scene) and homographies (a plane, where an essential matrix is not fixed by its
 // points), takes every motion that the best of each kind allows, refines each on all its inliers, and keeps the one
-// that puts most points in front of both cameras with small error and enough parallax. nullopt if that is fewer than
-// min_points, or if a clearly different motion does nearly as well. `seed` decides the samples.
+// that explains the pairs best: least sum of truncated squared errors, points behind a camera counted as unexplained.
+// (Not the one with most points of good parallax: a wrong motion sideways gives parallax to all.) nullopt if fewer than
+// min_points have a small error and enough parallax, or if a clearly different motion explains nearly as much. `seed`
+// decides the samples.
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
                                              uint64_t seed, const TwoViewOptions& options);
 
