@@ -32,12 +32,23 @@ struct PoseEstimate {
   bool is_keyframe = false;
 };
 
+// A keypoint that sees what a keypoint of an earlier keyframe saw, said before the tracker knows the landmark's id.
+struct SharedKeypoint {
+  int32_t keypoint = -1;        // of the new keyframe
+  KeyframeId other;             // an earlier keyframe
+  int32_t other_keypoint = -1;  // of `other`
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // where the tracker takes the point to be
+};
+
 // A frame that becomes part of the map. Its features never change; its pose does, later, in the mapper.
 struct KeyframeObservation {
   KeyframeId id;
   FeatureFrame features;
   Rigid3 world_from_camera;                 // the tracker's estimate
   std::vector<LandmarkId> landmarks;        // by keypoint: the landmark it saw; invalid: none
+  KeyframeId reference;                     // the keyframe that the estimate is relative to; invalid: a new part begins
+  Rigid3 reference_from_camera;             // what is left true when the reference moves
+  std::vector<SharedKeypoint> shared;       // points without an id yet: mono's first ones, or from depth
 };
 
 }  // namespace tessera

@@ -22,7 +22,8 @@ bool IsFinite(const BundleProblem& problem) {
                      [](const BundlePoint& point) { return point.position_in_world.allFinite(); }) &&
          std::all_of(problem.observations.begin(), problem.observations.end(),
                      [](const BundleObservation& o) {
-                       return o.seen.pixel_px.allFinite() && std::isfinite(o.seen.right_x_px);
+                       return o.seen.pixel_px.allFinite() &&
+                              (!o.seen.has_right() || std::isfinite(o.seen.right_x_px));
                      }) &&
          std::all_of(problem.constraints.begin(), problem.constraints.end(),
                      [](const RelativePoseConstraint& c) { return IsFinite(c.to_from_from); });

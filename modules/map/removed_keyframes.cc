@@ -1,0 +1,40 @@
+#include "map/removed_keyframes.h"
+
+namespace tessera {
+
+void RemovedKeyframes::Remember(const Map& map, const MapDelta& delta) {
+  for (const KeyframeId id : delta.removed_keyframes) {
+    Remember(map, id);
+  }
+}
+
+void RemovedKeyframes::Remember(const Map& map, KeyframeId id) {
+  const Keyframe* keyframe = map.FindKeyframe(id);
+  if (keyframe == nullptr) return;
+  if (const std::optional<Rigid3> world_from_parent = Find(map, keyframe->parent)) {
+    ties_[id] = {keyframe->parent, world_from_parent->Inverse() * keyframe->world_from_camera};
+  }
+}
+
+std::optional<Rigid3> RemovedKeyframes::Find(const Map& map, KeyframeId id) const {
+  Rigid3 ancestor_from_camera;
+  while (true) {
+    if (const Keyframe* keyframe = map.FindKeyframe(id); keyframe != nullptr) {
+      return keyframe->world_from_camera * ancestor_from_camera;
+    }
+    const auto tie = ties_.find(id);
+    if (tie == ties_.end()) return std::nullopt;
+    ancestor_from_camera = tie->second.parent_from_camera * ancestor_from_camera;
+    id = tie->second.parent;
+  }
+}
+
+KeyframeId RemovedKeyframes::Successor(const Map& map, KeyframeId id) const {
+  while (id.valid() && map.FindKeyframe(id) == nullptr) {
+    const auto tie = ties_.find(id);
+    id = tie == ties_.end() ? KeyframeId{} : tie->second.parent;
+  }
+  return id;
+}
+
+}  // namespace tessera

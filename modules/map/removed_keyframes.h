@@ -1,0 +1,32 @@
+// Where keyframes stood that are no longer in the map, so that what was stored relative to them keeps its place.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "map/map.h"
+
+namespace tessera {
+
+class RemovedKeyframes {
+ public:
+  // To be called with each delta before it is applied to `map`. Removed keyframes are tied to their parent, as it stands
+  // in the map then (a parent that goes too, or has gone before, passes them on to its own).
+  void Remember(const Map& map, const MapDelta& delta);
+  // Ties one keyframe of the map to its parent.
+  void Remember(const Map& map, KeyframeId id);
+
+  // world_from_camera of a keyframe that is in the map or has been there; nullopt of one that never was.
+  std::optional<Rigid3> Find(const Map& map, KeyframeId id) const;
+  // The keyframe of the map that `id` is tied to: itself if it is there. Invalid if it never was.
+  KeyframeId Successor(const Map& map, KeyframeId id) const;
+
+ private:
+  struct Tie {
+    KeyframeId parent;
+    Rigid3 parent_from_camera;
+  };
+  std::map<KeyframeId, Tie> ties_;
+};
+
+}  // namespace tessera

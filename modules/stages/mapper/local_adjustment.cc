@@ -1,0 +1,127 @@
+#include "stages/mapper/local_adjustment.h"
+
+#include <algorithm>
+
+#include "tracking/landmark_view.h"
+
+namespace tessera {
+namespace {
+
+void AddPoses(const Map& map, const LocalWindow& window, BundleProblem& problem) {
+  const auto add = [&](KeyframeId id, bool is_fixed) {
+    problem.poses.push_back({id, map.FindKeyframe(id)->world_from_camera.Inverse(), is_fixed});
+  };
+  for (const KeyframeId id : window.inner) {
+    add(id, !map.FindKeyframe(id)->parent.valid());
+  }
+  for (const KeyframeId id : window.outer) {
+    add(id, true);
+  }
+  const auto num_fixed = std::count_if(problem.poses.begin(), problem.poses.end(),
+                                       [](const BundlePose& pose) { return pose.is_fixed; });
+  if (num_fixed == 0) problem.poses.front().is_fixed = true;
+}
+
+// Index of the keyframe among the poses; -1: not in the window.
+int PoseIndex(const BundleProblem& problem, const std::vector<size_t>& by_id, KeyframeId id) {
+  const auto place = std::lower_bound(by_id.begin(), by_id.end(), id,
+                                      [&](size_t index, KeyframeId key) { return problem.poses[index].id < key; });
+  return place != by_id.end() && problem.poses[*place].id == id ? static_cast<int>(*place) : -1;
+}
+
+void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, BundleProblem& problem) {
+  std::vector<size_t> by_id(problem.poses.size());
+  for (size_t i = 0; i < by_id.size(); ++i) by_id[i] = i;
+  std::sort(by_id.begin(), by_id.end(), [&](size_t a, size_t b) { return problem.poses[a].id < problem.poses[b].id; });
+  for (const LandmarkId id : landmarks) {
+    const int point = static_cast<int>(problem.points.size());
+    problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
+    for (const Observation& observation : map.ObservationsOf(id)) {
+      const int pose = PoseIndex(problem, by_id, observation.keyframe);
+      if (pose < 0) continue;
+      const FeatureFrame& features = *map.FindKeyframe(observation.keyframe)->features;
+      problem.observations.push_back({pose, point, SeenAt(features, observation.keypoint)});
+    }
+  }
+}
+
+// Mono with a single fixed pose: the free pose of the lowest id keeps its distance.
+int ScalePose(const BundleProblem& problem) {
+  const auto num_fixed = std::count_if(problem.poses.begin(), problem.poses.end(),
+                                       [](const BundlePose& pose) { return pose.is_fixed; });
+  const bool has_right = std::any_of(problem.observations.begin(), problem.observations.end(),
+                                     [](const BundleObservation& o) { return o.seen.has_right(); });
+  if (num_fixed > 1 || has_right) return -1;
+  int best = -1;
+  for (size_t i = 0; i < problem.poses.size(); ++i) {
+    const BundlePose& pose = problem.poses[i];
+    if (!pose.is_fixed && (best < 0 || pose.id < problem.poses[static_cast<size_t>(best)].id)) {
+      best = static_cast<int>(i);
+    }
+  }
+  return best;
+}
+
+// Landmarks that only `id` sees are tied to it.
+void MoveOwnLandmarks(KeyframeId id, const Rigid3& world_from_camera, MapEditor& editor) {
+  const Map& map = editor.map();
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  const Rigid3 moved_from_old = world_from_camera * keyframe.world_from_camera.Inverse();
+  for (const LandmarkId landmark_id : keyframe.landmarks) {
+    if (!landmark_id.valid() || map.ObservationsOf(landmark_id).size() != 1) continue;
+    Landmark landmark = *map.FindLandmark(landmark_id);
+    landmark.position_in_world = moved_from_old * landmark.position_in_world;
+    editor.ChangeLandmark(landmark_id, landmark);
+  }
+}
+
+}  // namespace
+
+BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window) {
+  BundleProblem problem;
+  problem.calibration = map.FindKeyframe(window.inner.front())->features->calibration;
+  problem.baseline_m = Baseline(problem.calibration);
+  AddPoses(map, window, problem);
+  AddLandmarks(map, window.landmarks, problem);
+  problem.scale_pose = ScalePose(problem);
+  return problem;
+}
+
+void WriteBack(const BundleProblem& problem, const BundleResult& result, MapEditor& editor) {
+  const Map& map = editor.map();
+  for (size_t i = 0; i < problem.poses.size(); ++i) {
+    if (problem.poses[i].is_fixed) continue;
+    const Rigid3 world_from_camera = result.camera_from_world[i].Inverse();
+    MoveOwnLandmarks(problem.poses[i].id, world_from_camera, editor);
+    editor.MoveKeyframe(problem.poses[i].id, world_from_camera);
+  }
+  for (size_t i = 0; i < problem.points.size(); ++i) {
+    Landmark landmark = *map.FindLandmark(problem.points[i].id);
+    landmark.position_in_world = result.positions_in_world[i];
+    editor.ChangeLandmark(problem.points[i].id, landmark);
+  }
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    if (result.is_inlier[i]) continue;
+    const LandmarkId landmark = problem.points[static_cast<size_t>(problem.observations[i].point)].id;
+    const KeyframeId keyframe = problem.poses[static_cast<size_t>(problem.observations[i].pose)].id;
+    const std::vector<Observation>& observations = map.ObservationsOf(landmark);
+    const auto seen = std::find_if(observations.begin(), observations.end(),
+                                   [&](const Observation& o) { return o.keyframe == keyframe; });
+    if (seen != observations.end()) editor.RemoveObservation(landmark, Observation(*seen));
+  }
+  for (const BundlePoint& point : problem.points) {
+    if (map.ObservationsOf(point.id).size() < 2) editor.RemoveLandmark(point.id);
+  }
+}
+
+void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, const BundleOptions& bundle_options,
+                   MapEditor& editor) {
+  const LocalWindow window = SelectLocalWindow(editor.map(), center, window_options);
+  if (window.landmarks.empty()) return;
+  const BundleProblem problem = BuildLocalProblem(editor.map(), window);
+  if (const std::optional<BundleResult> result = AdjustBundle(problem, bundle_options)) {
+    WriteBack(problem, *result, editor);
+  }
+}
+
+}  // namespace tessera

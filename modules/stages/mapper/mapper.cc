@@ -1,0 +1,143 @@
+#include "stages/mapper/mapper.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <vector>
+
+#include "map/landmark_description.h"
+#include "map/map_editor.h"
+#include "stages/mapper/local_adjustment.h"
+#include "tracking/landmark_view.h"
+
+namespace tessera {
+namespace {
+
+bool CanObserve(const Map& map, KeyframeId keyframe, int32_t keypoint, LandmarkId landmark) {
+  const Keyframe* seeing = map.FindKeyframe(keyframe);
+  if (seeing == nullptr || map.FindLandmark(landmark) == nullptr || keypoint < 0 ||
+      static_cast<size_t>(keypoint) >= seeing->landmarks.size() ||
+      seeing->landmarks[static_cast<size_t>(keypoint)].valid()) {
+    return false;
+  }
+  const std::vector<Observation>& observations = map.ObservationsOf(landmark);
+  return std::none_of(observations.begin(), observations.end(),
+                      [&](const Observation& observation) { return observation.keyframe == keyframe; });
+}
+
+// The spanning tree's parent of a new keyframe: the one that shares most landmarks.
+void ChooseParent(KeyframeId id, MapEditor& editor) {
+  const std::vector<KeyframeId> best = editor.map().Covisible(id, 1);
+  if (!best.empty() && best.front() != editor.map().FindKeyframe(id)->parent) {
+    editor.SetParent(id, best.front());
+  }
+}
+
+// Whether the observations left still fix the landmark: two of them, or one with a depth.
+bool IsFixed(const Map& map, LandmarkId id) {
+  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  if (observations.size() != 1) return observations.size() > 1;
+  return SeenAt(*map.FindKeyframe(observations[0].keyframe)->features, observations[0].keypoint).has_right();
+}
+
+void RefreshDescriptions(MapEditor& editor) {
+  const std::vector<LandmarkId> touched(editor.touched_landmarks().begin(), editor.touched_landmarks().end());
+  for (const LandmarkId id : touched) {
+    if (!IsFixed(editor.map(), id)) {
+      editor.RemoveLandmark(id);
+    } else {
+      editor.ChangeLandmark(id, DescribeLandmark(editor.map(), id));
+    }
+  }
+}
+
+}  // namespace
+
+std::string MapperOptions::Check() const {
+  for (const std::string& sentence :
+       {creation.Check(), fusion.Check(), window.Check(), bundle.Check(), culling.Check()}) {
+    if (!sentence.empty()) return sentence;
+  }
+  return "";
+}
+
+Mapper::Mapper(const MapperOptions& options) : options_(options) {
+  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+}
+
+MapDelta Mapper::Process(const KeyframeObservation& seen) {
+  MapEditor editor(map_);
+  Insert(seen, editor);
+  ObserveLandmarks(seen, editor);
+  ObserveShared(seen, editor);
+  ChooseParent(seen.id, editor);
+  trial_.Judge(seen.id, options_.culling, editor);
+  const std::vector<LandmarkId> from_pairs = CreateLandmarks(seen.id, editor);
+  FuseLandmarks(seen.id, options_.fusion, editor);
+  RemoveUnconfirmed(seen.id, from_pairs, options_.culling, editor);
+  AdjustLocally(seen.id, options_.window, options_.bundle, editor);
+  CullKeyframes(seen.id, options_.culling, removed_, editor);
+  RefreshDescriptions(editor);
+  return editor.Finish(seen.id);
+}
+
+// world_from_camera = world_from_reference (as the map has it now) * reference_from_camera
+void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
+  const size_t num_keypoints = seen.features.keypoints.size();
+  if (!seen.id.valid() || map_.FindKeyframe(seen.id) != nullptr || seen.landmarks.size() != num_keypoints ||
+      seen.features.descriptors.size() != num_keypoints) {
+    throw std::invalid_argument("keyframe " + std::to_string(seen.id.value) +
+                                " is not new, or its lists do not fit its keypoints");
+  }
+  const std::optional<Rigid3> world_from_reference = removed_.Find(map_, seen.reference);
+  const Rigid3 pose =
+      world_from_reference ? *world_from_reference * seen.reference_from_camera : seen.world_from_camera;
+  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), pose,
+                     std::make_shared<const FeatureFrame>(seen.features));
+}
+
+void Mapper::ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor) {
+  for (size_t i = 0; i < seen.landmarks.size(); ++i) {
+    const auto keypoint = static_cast<int32_t>(i);
+    if (seen.landmarks[i].valid() && CanObserve(map_, seen.id, keypoint, seen.landmarks[i])) {
+      editor.AddObservation(seen.landmarks[i], {seen.id, keypoint});
+    }
+  }
+}
+
+// A keypoint of an earlier keyframe stands for its landmark; where it has none, the point becomes one.
+void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
+  std::vector<LandmarkId> created;
+  for (const SharedKeypoint& shared : seen.shared) {
+    const Keyframe* other = map_.FindKeyframe(shared.other);
+    if (other == nullptr || shared.other_keypoint < 0 ||
+        static_cast<size_t>(shared.other_keypoint) >= other->landmarks.size()) {
+      continue;
+    }
+    LandmarkId landmark = other->landmarks[static_cast<size_t>(shared.other_keypoint)];
+    if (!landmark.valid()) {
+      const Keyframe& own = *map_.FindKeyframe(seen.id);
+      if (shared.keypoint < 0 || static_cast<size_t>(shared.keypoint) >= own.landmarks.size() ||
+          own.landmarks[static_cast<size_t>(shared.keypoint)].valid()) {
+        continue;
+      }
+      landmark = editor.AddLandmark({.position_in_world = shared.position_in_world});
+      editor.AddObservation(landmark, {shared.other, shared.other_keypoint});
+      created.push_back(landmark);
+    }
+    if (CanObserve(map_, seen.id, shared.keypoint, landmark)) {
+      editor.AddObservation(landmark, {seen.id, shared.keypoint});
+    }
+  }
+  for (const LandmarkId landmark : created) {
+    editor.ChangeLandmark(landmark, DescribeLandmark(map_, landmark));
+  }
+}
+
+std::vector<LandmarkId> Mapper::CreateLandmarks(KeyframeId id, MapEditor& editor) {
+  std::vector<LandmarkId> from_pairs = CreateFromPairs(id, options_.creation, editor);
+  trial_.Add(id, from_pairs);
+  trial_.Add(id, CreateFromDepth(id, options_.creation, editor));
+  return from_pairs;
+}
+
+}  // namespace tessera

@@ -1,0 +1,169 @@
+#include "stages/mapper/mapper.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "mapping/synthetic_world.h"
+
+namespace tessera {
+namespace {
+
+// Drives through the world as a tracker would tell it: each keyframe's pose relative to the one before, with an error,
+// and what it sees in common with the one before, of the points whose number `known` picks.
+class Drive {
+ public:
+  Drive(SyntheticWorld& world, double pose_error, size_t known) : world_(world), error_(pose_error), known_(known) {}
+
+  KeyframeObservation Next(int64_t step) {
+    const SyntheticWorld::Picture picture = world_.Take(step);
+    KeyframeObservation seen;
+    seen.id = {next_id_++};
+    seen.features = picture.features;
+    seen.landmarks.resize(picture.points.size());
+    const Rigid3 truth = world_.Pose(static_cast<double>(step));
+    seen.reference = {seen.id.value - 1};
+    const double sign = seen.id.value % 2 == 0 ? 1.0 : -1.0;
+    Eigen::Matrix<double, 6, 1> error = Eigen::Matrix<double, 6, 1>::Constant(sign * error_);
+    error.tail<3>() *= 0.2;
+    seen.reference_from_camera = Retract(last_truth_.Inverse() * truth, error);
+    seen.world_from_camera = seen.id.value == 0 ? truth : last_estimate_ * seen.reference_from_camera;
+    for (size_t i = 0; i < picture.points.size(); ++i) {
+      const auto before = last_keypoints_.find(picture.points[i]);
+      if (before == last_keypoints_.end() || picture.points[i] % known_ != 0) continue;
+      seen.shared.push_back({static_cast<int32_t>(i), seen.reference, before->second, world_.point(picture.points[i])});
+    }
+    last_keypoints_.clear();
+    for (size_t i = 0; i < picture.points.size(); ++i) last_keypoints_[picture.points[i]] = static_cast<int32_t>(i);
+    last_truth_ = truth;
+    last_estimate_ = seen.world_from_camera;
+    points_.push_back(picture.points);
+    return seen;
+  }
+
+  // The point that a keypoint of a keyframe shows.
+  size_t PointOf(const Observation& o) const {
+    return points_[static_cast<size_t>(o.keyframe.value)][static_cast<size_t>(o.keypoint)];
+  }
+
+ private:
+  SyntheticWorld& world_;
+  double error_;
+  size_t known_;
+  int64_t next_id_ = 0;
+  Rigid3 last_truth_, last_estimate_;
+  std::map<size_t, int32_t> last_keypoints_;
+  std::vector<std::vector<size_t>> points_;  // by keyframe and keypoint
+};
+
+double CenterError(const Rigid3& a, const Rigid3& b) { return (a.translation - b.translation).norm(); }
+
+// Share of observations that show another point than the landmark's first one.
+double WrongShare(const Map& map, const Drive& drive) {
+  int num_wrong = 0, num_all = 0;
+  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
+    const std::vector<Observation>& observations = map.ObservationsOf(id);
+    for (const Observation& observation : observations) {
+      num_wrong += drive.PointOf(observation) != drive.PointOf(observations.front()) ? 1 : 0;
+      ++num_all;
+    }
+  });
+  return static_cast<double>(num_wrong) / num_all;
+}
+
+TEST(Mapper, MonoCorrectsPosesAndFindsTheOtherPoints) {
+  SyntheticWorld world(SensorType::kMono, 0.0);
+  Drive drive(world, 0.03, 3);
+  Mapper mapper({});
+  for (int64_t step = 0; step < 12; ++step) {
+    KeyframeObservation seen = drive.Next(step);
+    if (step == 1) seen.reference_from_camera = world.Pose(0.0).Inverse() * world.Pose(1.0);  // fixes the scale
+    EXPECT_EQ(mapper.Process(seen).answers, seen.id);
+  }
+  const Map& map = mapper.map();
+  EXPECT_LT(WrongShare(map, drive), 0.01);
+  EXPECT_GT(map.landmarks().size(), 500);  // about a third of the points was told
+  map.keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
+    const Rigid3 truth = world.Pose(static_cast<double>(keyframe.features->frame.value));
+    EXPECT_LT(CenterError(keyframe.world_from_camera, truth), 1e-3) << keyframe.features->frame.value;
+  });
+  std::vector<double> errors;
+  map.landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
+    const size_t point = drive.PointOf(map.ObservationsOf(id).front());
+    errors.push_back((landmark.position_in_world - world.point(point)).norm());
+  });
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() * 9 / 10], 5e-3);
+}
+
+TEST(Mapper, StereoBuildsAMapFromDepthUnderNoise) {
+  SyntheticWorld world(SensorType::kStereo, 0.5);
+  Drive drive(world, 0.02, 2);
+  Mapper mapper({});
+  for (int64_t step = 0; step < 12; ++step) (void)mapper.Process(drive.Next(step));
+  EXPECT_LT(WrongShare(mapper.map(), drive), 0.02);
+  mapper.map().keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
+    const Rigid3 truth = world.Pose(static_cast<double>(keyframe.features->frame.value));
+    EXPECT_LT(CenterError(keyframe.world_from_camera, truth), 0.03);
+  });
+}
+
+TEST(Mapper, SameKeyframesMakeTheSameDeltasAndReplicasFollow) {
+  SyntheticWorld world(SensorType::kStereo, 0.5);
+  Drive drive(world, 0.02, 2);
+  Mapper first({}), second({});
+  Map replica;
+  for (int64_t step = 0; step < 8; ++step) {
+    const KeyframeObservation seen = drive.Next(step);
+    const MapDelta delta = first.Process(seen);
+    EXPECT_EQ(second.Process(seen).hash, delta.hash);
+    EXPECT_EQ(replica.Apply(delta), "");
+  }
+  EXPECT_EQ(replica.Sha256Hex(), second.map().Sha256Hex());
+}
+
+TEST(Mapper, RedundantKeyframesGoAndTheirPlaceIsRemembered) {
+  SyntheticWorld world(SensorType::kStereo, 0.2);
+  Drive drive(world, 0.0, 1);
+  Mapper mapper({});
+  for (int64_t k = 0; k < 15; ++k) (void)mapper.Process(drive.Next(k / 8));  // stands still twice
+  EXPECT_LT(mapper.map().keyframes().size(), 12);
+  for (int64_t k = 0; k < 15; ++k) {
+    const auto pose = mapper.removed_keyframes().Find(mapper.map(), {k});
+    ASSERT_TRUE(pose.has_value()) << k;
+    EXPECT_LT(CenterError(*pose, world.Pose(static_cast<double>(k / 8))), 0.02);
+  }
+}
+
+TEST(Mapper, LandmarksThatAreGoneAreSkipped) {
+  SyntheticWorld world(SensorType::kStereo, 0.2);
+  Drive drive(world, 0.0, 1);
+  Mapper mapper({});
+  (void)mapper.Process(drive.Next(0));
+  KeyframeObservation seen = drive.Next(1);
+  seen.landmarks[0] = {1000000};
+  seen.landmarks[1] = seen.landmarks[2] = {0};  // one landmark can't be at two places
+  seen.shared.push_back({0, {77}, 0, Eigen::Vector3d::Zero()});
+  seen.shared.push_back({0, {0}, 1000000, Eigen::Vector3d::Zero()});
+  (void)mapper.Process(seen);
+  const Keyframe& keyframe = *mapper.map().FindKeyframe({1});
+  EXPECT_NE(keyframe.landmarks[0], LandmarkId{1000000});
+  EXPECT_LE(std::count(keyframe.landmarks.begin(), keyframe.landmarks.end(), LandmarkId{0}), 1);
+}
+
+TEST(Mapper, RefusesAKeyframeThatItHasOrThatDoesNotFit) {
+  SyntheticWorld world(SensorType::kStereo, 0.2);
+  Drive drive(world, 0.0, 1);
+  Mapper mapper({});
+  KeyframeObservation seen = drive.Next(0);
+  (void)mapper.Process(seen);
+  EXPECT_THROW((void)mapper.Process(seen), std::invalid_argument);
+  seen.id = {5};
+  seen.landmarks.pop_back();
+  EXPECT_THROW((void)mapper.Process(seen), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tessera
