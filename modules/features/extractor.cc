@@ -29,6 +29,7 @@ TileFeatures Extractor::Extract(const TileJob& job) {
   DetectCandidates(job);
 
   TileFeatures features{.frame = job.frame,
+                        .previous_frame = job.previous_frame,
                         .utime_us = job.utime_us,
                         .arrival_us = job.arrival_us,
                         .tile = job.tile,
