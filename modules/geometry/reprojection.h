@@ -2,20 +2,24 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
+#include <limits>
 
 #include "geometry/camera.h"
 
 namespace tessera {
+
+inline constexpr double kNoColumn = std::numeric_limits<double>::quiet_NaN();
 
 // Where an image shows a point. A depth z is carried as the column that a right camera `baseline_m` away would see,
 // u_right = u - fx baseline / z: for a stereo pair that is what was measured, and for a structured-light RGB-D camera
 // the error of its depth grows with z^2 as that of a disparity does.
 struct PixelObservation {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
-  double right_x_px = -1.0;  // column in the right image; < 0: not seen there
+  double right_x_px = kNoColumn;  // column in the right image, may lie outside of it; kNoColumn: not known
   double sigma_px = 1.0;     // standard deviation of each coordinate
 
-  bool has_right() const { return right_x_px >= 0.0; }
+  bool has_right() const { return !std::isnan(right_x_px); }
 };
 
 // r = (u, v, u_right)(point_in_camera) - observation, and dr/d(point_in_camera), both divided by sigma_px. The third
