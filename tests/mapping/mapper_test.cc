@@ -11,8 +11,8 @@
 namespace tessera {
 namespace {
 
-// Drives through the world as a tracker would tell it: each keyframe's pose relative to the one before, with an error,
-// and what it sees in common with the one before, of the points whose number `known` picks.
+// Drives through the world as a tracker would tell it: each keyframe's pose relative to the one before, with an
+// error, and what it sees in common with the one before, of the points whose number `known` picks.
 class Drive {
  public:
   Drive(SyntheticWorld& world, double pose_error, size_t known) : world_(world), error_(pose_error), known_(known) {}
@@ -33,7 +33,8 @@ class Drive {
     for (size_t i = 0; i < picture.points.size(); ++i) {
       const auto before = last_keypoints_.find(picture.points[i]);
       if (before == last_keypoints_.end() || picture.points[i] % known_ != 0) continue;
-      seen.shared.push_back({static_cast<int32_t>(i), seen.reference, before->second, world_.point(picture.points[i])});
+      seen.shared.push_back(
+          {static_cast<int32_t>(i), seen.reference, before->second, world_.point(picture.points[i])});
     }
     last_keypoints_.clear();
     for (size_t i = 0; i < picture.points.size(); ++i) last_keypoints_[picture.points[i]] = static_cast<int32_t>(i);

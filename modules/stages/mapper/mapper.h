@@ -20,7 +20,7 @@ struct MapperOptions {
   CreationOptions creation;
   FusionOptions fusion;
   LocalWindowOptions window;
-  BundleOptions bundle;
+  BundleOptions bundle{.max_num_iterations = 5};  // a warm start; what is left comes with the next keyframe
   CullingOptions culling;
 
   // Empty if all is well, else one sentence.

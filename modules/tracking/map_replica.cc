@@ -1,0 +1,62 @@
+#include "tracking/map_replica.h"
+
+namespace tessera {
+
+Landmark InWorld(const Rigid3& world_from_camera, Landmark point) {
+  point.position_in_world = world_from_camera * point.position_in_world;
+  point.normal = world_from_camera.rotation * point.normal;
+  return point;
+}
+
+std::string MapReplica::Apply(const MapDelta& delta) {
+  removed_.Remember(map_, delta);
+  std::string problem = map_.Apply(delta);
+  sent_.erase(delta.answers);
+  return problem;
+}
+
+std::optional<Rigid3> MapReplica::PoseOf(KeyframeId id) const {
+  Rigid3 ancestor_from_camera;
+  for (auto sent = sent_.find(id); sent != sent_.end(); sent = sent_.find(id)) {
+    ancestor_from_camera = sent->second.reference_from_camera * ancestor_from_camera;
+    id = sent->second.reference;
+    if (!id.valid()) return ancestor_from_camera;
+  }
+  const std::optional<Rigid3> world_from_ancestor = removed_.Find(map_, id);
+  if (!world_from_ancestor) return std::nullopt;
+  return *world_from_ancestor * ancestor_from_camera;
+}
+
+std::optional<Landmark> MapReplica::Find(const PointId& id) const {
+  if (id.landmark.valid()) {
+    const Landmark* landmark = map_.FindLandmark(id.landmark);
+    return landmark == nullptr ? std::nullopt : std::optional(*landmark);
+  }
+  const auto sent = sent_.find(id.keyframe);
+  if (sent == sent_.end()) return std::nullopt;
+  const auto point = sent->second.points.find(id.keypoint);
+  const std::optional<Rigid3> pose = PoseOf(id.keyframe);
+  if (point == sent->second.points.end() || !pose) return std::nullopt;
+  return InWorld(*pose, point->second);
+}
+
+PointId MapReplica::Renew(const PointId& id) const {
+  if (id.landmark.valid()) return map_.FindLandmark(id.landmark) != nullptr ? id : PointId{};
+  if (sent_.contains(id.keyframe)) return id;
+  const Keyframe* keyframe = map_.FindKeyframe(id.keyframe);
+  return keyframe == nullptr ? PointId{} : PointId{keyframe->landmarks[static_cast<size_t>(id.keypoint)], {}, -1};
+}
+
+std::vector<std::pair<PointId, Landmark>> MapReplica::SentPoints() const {
+  std::vector<std::pair<PointId, Landmark>> points;
+  for (const auto& [id, keyframe] : sent_) {
+    const std::optional<Rigid3> pose = PoseOf(id);
+    if (!pose) continue;
+    for (const auto& [keypoint, point] : keyframe.points) {
+      points.emplace_back(PointId{{}, id, keypoint}, InWorld(*pose, point));
+    }
+  }
+  return points;
+}
+
+}  // namespace tessera

@@ -1,0 +1,60 @@
+// The map as the tracker sees it: the replica that deltas made, and the keyframes that it sent and no delta answered
+// yet, with the points that it placed itself.
+#pragma once
+
+#include <compare>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "map/map.h"
+#include "map/removed_keyframes.h"
+
+namespace tessera {
+
+// A point that a frame can see: a landmark of the map, or what a keypoint of an unanswered keyframe sees.
+struct PointId {
+  LandmarkId landmark;
+  KeyframeId keyframe;
+  int32_t keypoint = -1;
+
+  bool valid() const { return landmark.valid() || keyframe.valid(); }
+  auto operator<=>(const PointId&) const = default;
+};
+
+// The landmark of a camera's frame in the world's.
+Landmark InWorld(const Rigid3& world_from_camera, Landmark point_in_camera);
+
+// A keyframe on its way to the mapper.
+struct SentKeyframe {
+  KeyframeId reference;          // invalid: the first of a part
+  Rigid3 reference_from_camera;  // world_from_camera for the first of a part
+  std::map<int32_t, Landmark> points;  // by keypoint: placed by the tracker, in the frame of the camera
+};
+
+class MapReplica {
+ public:
+  // Returns Map::Apply's sentence. The keyframe that the delta answers is no longer on its way.
+  std::string Apply(const MapDelta& delta);
+  void Send(KeyframeId id, SentKeyframe keyframe) { sent_[id] = std::move(keyframe); }
+
+  const Map& map() const { return map_; }
+  const std::map<KeyframeId, SentKeyframe>& sent() const { return sent_; }
+
+  // world_from_camera of a keyframe of the map, one that was removed from it, or one on its way.
+  std::optional<Rigid3> PoseOf(KeyframeId id) const;
+  // The point in world coordinates; nullopt if it is gone.
+  std::optional<Landmark> Find(const PointId& id) const;
+  // The same point under its present name: its landmark once the mapper answered. Invalid if it is gone.
+  PointId Renew(const PointId& id) const;
+  // All points placed by the tracker itself that no delta answered yet, in world coordinates.
+  std::vector<std::pair<PointId, Landmark>> SentPoints() const;
+
+ private:
+  Map map_;
+  RemovedKeyframes removed_;
+  std::map<KeyframeId, SentKeyframe> sent_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,318 @@
+#include "tracking/map_tracker.h"
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "geometry/absolute_pose.h"
+
+namespace tessera {
+namespace {
+
+size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
+
+// A point placed from one view alone, in the frame of its camera; fields as in DescribeLandmark.
+Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera) {
+  Landmark point;
+  const double distance = point_in_camera.norm();
+  point.position_in_world = point_in_camera;
+  point.normal = -point_in_camera / distance;
+  point.max_distance = distance * LevelScale(view.keypoint(keypoint).level);
+  point.min_distance = point.max_distance / LevelScale(kTopLevel);
+  point.descriptor = view.descriptor(keypoint);
+  return point;
+}
+
+}  // namespace
+
+std::string MapTrackerOptions::Check() const {
+  for (const std::string& sentence : {start.Check(), matching.Check(), keyframes.Check()}) {
+    if (!sentence.empty()) return sentence;
+  }
+  if (!(sigma_px > 0.0)) return "tracker.sigma_px must be positive";
+  if (min_inliers < 6 || max_local_keyframes < 1) return "tracker.min_inliers must be at least 6";
+  return "";
+}
+
+MapTracker::MapTracker(const MapTrackerOptions& options)
+    : options_(options), initializer_(options.start), decision_(options.keyframes) {
+  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+}
+
+MapTrackingResult MapTracker::Track(const FeatureFrame& features) {
+  const auto view = std::make_shared<const FrameView>(features, options_.sigma_px, kRgbdBaseline);
+  MapTrackingResult result;
+  PoseEstimate& pose = result.pose;
+  pose.frame = features.frame;
+  pose.utime_us = features.utime_us;
+  pose.arrival_us = features.arrival_us;
+  pose.num_features = view->size();
+  pose.num_landmarks = static_cast<int32_t>(replica_.map().landmarks().size());
+  if (!last_) {
+    pose.state = Start(view, result.keyframes) ? TrackingState::kTracked : TrackingState::kInitializing;
+  } else {
+    RenewLast();
+    TrackedFrame frame(view);
+    if (Place(frame)) {
+      pose.num_matches = frame.NumPoints();
+      Remember(std::move(frame));
+      if (IsKeyframeDue()) {
+        result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
+      }
+      pose.state = TrackingState::kTracked;
+    } else {
+      NoteLoss(features.utime_us);
+      pose.state = TrackingState::kLost;
+    }
+  }
+  if (pose.state == TrackingState::kTracked) {
+    pose.world_from_camera = last_->frame.world_from_camera;
+    pose.reference_keyframe = reference_;
+    pose.reference_from_camera = last_->reference_from_camera;
+    pose.num_inliers = last_->frame.NumPoints();
+    pose.is_keyframe = !result.keyframes.empty();
+  }
+  previous_utime_us_ = features.utime_us;
+  return result;
+}
+
+bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
+  current_from_last_.reset();
+  return view->baseline_m() > 0.0 ? StartFromDepth(view, keyframes) : StartFromPair(view, keyframes);
+}
+
+bool MapTracker::StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
+  int num_points = 0;
+  for (int i = 0; i < view->size(); ++i) num_points += view->observation(i).has_right() ? 1 : 0;
+  if (num_points < options_.min_start_points) return false;
+  TrackedFrame frame(view);
+  frame.world_from_camera = part_from_world_;
+  last_.emplace(Last{std::move(frame), Rigid3::Identity()});
+  keyframes.push_back(MakeKeyframe(last_->frame, {}, part_from_world_));
+  return true;
+}
+
+// Both frames become keyframes; the points go with the second one, as seen by a keypoint of each.
+bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
+  const std::optional<MonoStart> start = initializer_.Add(view);
+  if (!start) return false;
+  initializer_ = MonoInitializer(options_.start);
+  const KeyframeId first_id = next_keyframe_;
+  TrackedFrame first(start->first), second(start->second);
+  first.world_from_camera = part_from_world_;
+  keyframes.push_back(MakeKeyframe(first, {}, part_from_world_));
+
+  const Rigid3 first_from_second = start->second_from_first.Inverse();
+  second.world_from_camera = part_from_world_ * first_from_second;
+  SentKeyframe sent{{}, part_from_world_, {}};
+  for (const MonoStart::Point& point : start->points) {
+    const Landmark placed = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
+    sent.points[point.keypoint_first] = placed;
+    second.points[Index(point.keypoint_second)] = {{{}, first_id, point.keypoint_first},
+                                                   InWorld(part_from_world_, placed)};
+  }
+  replica_.Send(first_id, std::move(sent));
+  last_.emplace(Last{std::move(second), Rigid3::Identity()});
+  keyframes.push_back(MakeKeyframe(last_->frame, first_id, first_from_second));
+  return true;
+}
+
+// The last frame keeps its place relative to its reference, and its points take their newest places.
+void MapTracker::RenewLast() {
+  decision_.Renew(replica_);
+  if (const std::optional<Rigid3> world_from_reference = replica_.PoseOf(reference_)) {
+    last_->frame.world_from_camera = *world_from_reference * last_->reference_from_camera;
+  }
+  for (SeenPoint& point : last_->frame.points) {
+    if (!point.valid()) continue;
+    point.id = replica_.Renew(point.id);
+    if (const std::optional<Landmark> landmark = replica_.Find(point.id)) {
+      point.landmark = *landmark;
+    } else {
+      point = {};
+    }
+  }
+}
+
+bool MapTracker::Place(TrackedFrame& frame) const {
+  const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalise(frame);
+  if (!is_near) return false;
+  MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
+  return OptimizeFrame(frame) >= (lost_since_us_ ? options_.min_relocalised_inliers : options_.min_inliers);
+}
+
+bool MapTracker::FollowLast(TrackedFrame& frame) const {
+  const Rigid3 last_from_current = current_from_last_.value_or(Rigid3::Identity()).Inverse();
+  for (const double widening : {1.0, 2.0, 4.0}) {
+    frame.world_from_camera = last_->frame.world_from_camera * last_from_current;
+    const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
+    if (num >= options_.min_last_matches && OptimizeFrame(frame) >= options_.min_last_matches / 2) return true;
+  }
+  return false;
+}
+
+// Without a guess: the points around the last frame, wherever they are now.
+bool MapTracker::Relocalise(TrackedFrame& frame) const {
+  PlacedPoints points = LocalPoints(last_->frame);
+  for (const SeenPoint& point : last_->frame.points) {
+    if (point.valid()) points.emplace_back(point.id, point.landmark);
+  }
+  MatchAnywhere(points, options_.matching, frame);
+  std::vector<PointPixel> pairs;
+  for (int i = 0; i < frame.view->size(); ++i) {
+    if (!frame.points[Index(i)].valid()) continue;
+    const PixelObservation seen = frame.view->observation(i);
+    pairs.push_back({frame.points[Index(i)].landmark.position_in_world, seen.pixel_px, seen.sigma_px});
+  }
+  const auto seed = static_cast<uint64_t>(frame.view->features().frame.value);
+  const auto pose = EstimateAbsolutePose(frame.view->calibration(), pairs, seed, {});
+  if (!pose) return false;
+  frame.world_from_camera = pose->camera_from_world.Inverse();
+  return OptimizeFrame(frame) >= options_.min_last_matches / 2;
+}
+
+// Refines the pose on the points seen, and forgets those that disagree. Returns how many are left.
+int MapTracker::OptimizeFrame(TrackedFrame& frame) const {
+  std::vector<PoseObservation> observations;
+  std::vector<size_t> keypoints;
+  for (int i = 0; i < frame.view->size(); ++i) {
+    const SeenPoint& point = frame.points[Index(i)];
+    if (!point.valid()) continue;
+    observations.push_back({point.landmark.position_in_world, Eigen::Matrix3d::Zero(), frame.view->observation(i)});
+    keypoints.push_back(Index(i));
+  }
+  const PoseOptimizationResult result =
+      OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
+                   frame.world_from_camera.Inverse(), options_.pose);
+  frame.world_from_camera = result.camera_from_world.Inverse();
+  for (size_t k = 0; k < keypoints.size(); ++k) {
+    if (!result.is_inlier[k]) frame.points[keypoints[k]] = {};
+  }
+  return result.num_inliers;
+}
+
+// The keyframes that share most points with the frame, and then their neighbours, as long as there is room.
+std::vector<KeyframeId> MapTracker::LocalKeyframes(const TrackedFrame& frame) const {
+  const Map& map = replica_.map();
+  std::map<KeyframeId, int> num_shared;
+  for (const SeenPoint& point : frame.points) {
+    for (const Observation& observation : map.ObservationsOf(point.id.landmark)) ++num_shared[observation.keyframe];
+  }
+  std::vector<std::pair<int, KeyframeId>> ranked;
+  for (const auto& [id, count] : num_shared) ranked.emplace_back(-count, id);
+  std::sort(ranked.begin(), ranked.end());
+  ranked.resize(std::min(ranked.size(), static_cast<size_t>(options_.max_local_keyframes) * 2 / 3));
+  std::vector<KeyframeId> keyframes;
+  for (const auto& [count, id] : ranked) keyframes.push_back(id);
+  for (const auto& [count, id] : ranked) {
+    for (const KeyframeId neighbour : map.Covisible(id, 10)) {
+      if (static_cast<int>(keyframes.size()) >= options_.max_local_keyframes) return keyframes;
+      if (std::find(keyframes.begin(), keyframes.end(), neighbour) == keyframes.end()) keyframes.push_back(neighbour);
+    }
+  }
+  return keyframes;
+}
+
+// The landmarks of the keyframes around, and the points still on their way, that the frame does not see yet.
+PlacedPoints MapTracker::LocalPoints(const TrackedFrame& frame) const {
+  const Map& map = replica_.map();
+  std::vector<PointId> seen;
+  for (const SeenPoint& point : frame.points) {
+    if (point.valid()) seen.push_back(point.id);
+  }
+  std::sort(seen.begin(), seen.end());
+  std::vector<LandmarkId> known;
+  for (const KeyframeId id : LocalKeyframes(frame)) {
+    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+      if (landmark.valid()) known.push_back(landmark);
+    }
+  }
+  std::sort(known.begin(), known.end());
+  known.erase(std::unique(known.begin(), known.end()), known.end());
+  PlacedPoints points;
+  for (const LandmarkId id : known) {
+    const PointId point{id, {}, -1};
+    if (!std::binary_search(seen.begin(), seen.end(), point)) points.emplace_back(point, *map.FindLandmark(id));
+  }
+  for (auto& [point, landmark] : replica_.SentPoints()) {
+    if (!std::binary_search(seen.begin(), seen.end(), point)) points.emplace_back(point, landmark);
+  }
+  return points;
+}
+
+void MapTracker::Remember(TrackedFrame frame) {
+  current_from_last_.reset();
+  if (!lost_since_us_) current_from_last_ = frame.world_from_camera.Inverse() * last_->frame.world_from_camera;
+  lost_since_us_.reset();
+  const Rigid3 world_from_reference = replica_.PoseOf(reference_).value_or(Rigid3::Identity());
+  const Rigid3 reference_from_camera = world_from_reference.Inverse() * frame.world_from_camera;
+  last_.emplace(Last{std::move(frame), reference_from_camera});
+}
+
+void MapTracker::NoteLoss(int64_t utime_us) {
+  if (!lost_since_us_) lost_since_us_ = utime_us;
+  if (utime_us - *lost_since_us_ <= options_.max_lost_us) return;
+  part_from_world_ = last_->frame.world_from_camera;
+  last_.reset();
+  lost_since_us_.reset();
+  initializer_ = MonoInitializer(options_.start);
+}
+
+bool MapTracker::IsKeyframeDue() const {
+  const TrackedFrame& frame = last_->frame;
+  const double near_m = options_.max_depth_baselines * frame.view->baseline_m();
+  int num_near_known = 0, num_near_new = 0;
+  for (int i = 0; near_m > 0.0 && i < frame.view->size(); ++i) {
+    const auto point = PointFromDepth(frame.view->features(), i);
+    if (!point || point->z() > near_m) continue;
+    (frame.points[Index(i)].valid() ? num_near_known : num_near_new) += 1;
+  }
+  const Rigid3 world_from_reference = frame.world_from_camera * last_->reference_from_camera.Inverse();
+  const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
+  return decision_.Decide(frame, interval_us, world_from_reference, num_near_known, num_near_new);
+}
+
+// The frame becomes the reference of those to come.
+KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId reference,
+                                             const Rigid3& reference_from_camera) {
+  KeyframeObservation keyframe;
+  keyframe.id = next_keyframe_;
+  keyframe.features = frame.view->features();
+  keyframe.world_from_camera = frame.world_from_camera;
+  keyframe.reference = reference;
+  keyframe.reference_from_camera = reference_from_camera;
+  keyframe.landmarks.resize(frame.points.size());
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    const SeenPoint& point = frame.points[i];
+    keyframe.landmarks[i] = point.id.landmark;
+    if (point.id.keyframe.valid()) {
+      const auto keypoint = static_cast<int32_t>(i);
+      keyframe.shared.push_back(
+          {keypoint, point.id.keyframe, point.id.keypoint, point.landmark.position_in_world});
+    }
+  }
+  SentKeyframe sent{reference, reference_from_camera, {}};
+  PlaceDepthPoints(frame, keyframe.id, sent);
+  replica_.Send(keyframe.id, std::move(sent));
+  decision_.Restart(frame);
+  reference_ = keyframe.id;
+  ++next_keyframe_.value;
+  if (last_) last_->reference_from_camera = Rigid3::Identity();
+  return keyframe;
+}
+
+// Until the mapper answers, near keypoints with depth are points of their own.
+void MapTracker::PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const {
+  const double max_depth_m = options_.max_depth_baselines * frame.view->baseline_m();
+  for (int i = 0; i < frame.view->size(); ++i) {
+    if (frame.points[Index(i)].valid()) continue;
+    const auto point = PointFromDepth(frame.view->features(), i);
+    if (!point || point->z() > max_depth_m) continue;
+    const Landmark placed = PointOf(*frame.view, i, *point);
+    sent.points[i] = placed;
+    frame.points[Index(i)] = {{{}, id, i}, InWorld(frame.world_from_camera, placed)};
+  }
+}
+
+}  // namespace tessera

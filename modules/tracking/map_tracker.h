@@ -1,0 +1,98 @@
+// The tracker's step: one frame's features in, its pose and perhaps a keyframe out, in a map that the mapper owns and
+// that changes here by deltas. No bus, no clock.
+//
+// Points are matched around a constant-velocity prediction with the last frame's, then with the landmarks of the
+// keyframes around; after each, the pose is the one that explains the matches best. Between a keyframe and the delta
+// that answers it, the points that the tracker placed itself help out: mono's first ones, and near ones with depth.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/pose_optimization.h"
+#include "map/tracking_types.h"
+#include "tracking/initializer.h"
+#include "tracking/keyframe_decision.h"
+#include "tracking/map_replica.h"
+#include "tracking/point_matching.h"
+
+namespace tessera {
+
+struct MapTrackerOptions {
+  // Points far ahead have little parallax, but they last longest: less than the usual parallax will do for a start.
+  InitializerOptions start{.two_view = {.min_points = 100, .min_parallax_rad = 0.005}};
+  MatchOptions matching;
+  KeyframeDecisionOptions keyframes;
+  PoseOptimizationOptions pose;
+  double sigma_px = 1.0;             // standard deviation of a keypoint's coordinates at level 0
+  int min_start_points = 150;        // stereo, RGB-D: keypoints with depth that a first keyframe needs
+  int min_last_matches = 20;         // fewer from the last frame: look in wider windows
+  int min_inliers = 25;              // points that a pose must agree with
+  int min_relocalised_inliers = 50;  // likewise after a loss, where chance has more room
+  int max_local_keyframes = 30;      // whose landmarks are looked for
+  int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
+  double max_depth_baselines = 40.0; // stereo, RGB-D: up to here a keypoint's depth makes a point at once
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+struct MapTrackingResult {
+  PoseEstimate pose;
+  std::vector<KeyframeObservation> keyframes;  // made of this frame: none or one; or the two that mono starts from
+};
+
+class MapTracker {
+ public:
+  // Throws std::invalid_argument with Check()'s sentence.
+  explicit MapTracker(const MapTrackerOptions& options);
+
+  // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
+  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta) { return replica_.Apply(delta); }
+  // Frames in the order of their numbers; some may be missing. A pure function of the frames and deltas so far.
+  MapTrackingResult Track(const FeatureFrame& features);
+
+  const Map& map() const { return replica_.map(); }
+
+ private:
+  using Frame = std::shared_ptr<const FrameView>;
+
+  // What is remembered of the last tracked frame.
+  struct Last {
+    TrackedFrame frame;
+    Rigid3 reference_from_camera;
+  };
+
+  bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  void RenewLast();
+  bool Place(TrackedFrame& frame) const;
+  bool FollowLast(TrackedFrame& frame) const;
+  bool Relocalise(TrackedFrame& frame) const;
+  int OptimizeFrame(TrackedFrame& frame) const;
+  std::vector<KeyframeId> LocalKeyframes(const TrackedFrame& frame) const;
+  PlacedPoints LocalPoints(const TrackedFrame& frame) const;
+  void Remember(TrackedFrame frame);
+  void NoteLoss(int64_t utime_us);
+  bool IsKeyframeDue() const;
+  KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
+  void PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
+
+  const MapTrackerOptions options_;
+  MapReplica replica_;
+  MonoInitializer initializer_;
+  KeyframeDecision decision_;
+  std::optional<Last> last_;                 // nullopt: no part of the map is followed
+  std::optional<Rigid3> current_from_last_;  // velocity: motion over the last frame interval
+  KeyframeId next_keyframe_{0};
+  KeyframeId reference_;
+  Rigid3 part_from_world_;                   // world_from_camera where the next part begins
+  int64_t previous_utime_us_ = 0;            // of the frame before
+  std::optional<int64_t> lost_since_us_;
+};
+
+}  // namespace tessera
