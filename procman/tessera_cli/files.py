@@ -4,7 +4,8 @@ import os
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-BUILD = ROOT / "build"
+# TESSERA_BUILD: another build of the same sources, for those who work on them.
+BUILD = Path(os.environ.get("TESSERA_BUILD", ROOT / "build"))
 BIN = BUILD / "bin"
 
 

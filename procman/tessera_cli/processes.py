@@ -58,7 +58,13 @@ class StageProcess:
         ended, self._popen = self._popen, None
         return ended.returncode
 
-    def signal(self, number: int) -> None:
+    def ask_to_end(self) -> None:
+        self._signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self._signal(signal.SIGKILL)
+
+    def _signal(self, number: int) -> None:
         if self._popen is not None:
             os.kill(self._popen.pid, number)
 

@@ -1,7 +1,6 @@
 """tessera run and replay: starts the stack, watches it to the end of the source, and writes the summary."""
 
 import datetime
-import signal
 import time
 from argparse import Namespace
 from pathlib import Path
@@ -10,6 +9,7 @@ from tessera_cli import settings
 from tessera_cli.bus import BusListener
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import ROOT
+from tessera_cli.interrupt import Interrupt
 from tessera_cli.panel import make_view
 from tessera_cli.progress import RUNNING
 from tessera_cli.sources import Source, parse_source
@@ -25,20 +25,6 @@ LISTEN_MS = 50
 # What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
 RUN_FILES = ("summary.json", "run.json", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
              "keyframes.txt", "ground_truth.txt", "frames.csv", "run.lcmlog", "settings.yaml")
-
-
-class Interrupt:
-    """Ctrl-C and SIGTERM end the run in order; a second one at once."""
-
-    def __init__(self):
-        self.requested = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._on_signal)
-
-    def _on_signal(self, _number, _frame) -> None:
-        if self.requested:
-            raise KeyboardInterrupt
-        self.requested = True
 
 
 def main(arguments: Namespace) -> int:

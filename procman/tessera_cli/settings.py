@@ -63,6 +63,12 @@ def user_assignments(arguments: Namespace) -> list[str]:
     return arguments.settings
 
 
+def prefix_of(assignments: list[str]) -> str:
+    """The channel prefix that --set asks for."""
+    values = [text.partition("=")[2] for text in assignments if text.startswith("bus.channel_prefix=")]
+    return values[-1] if values else ""
+
+
 def write_settings(assignments: list[str], path: Path) -> dict:
     """Writes all settings to `path` and returns them as sections of keys."""
     command = [BIN / "tessera-settings", "--defaults", ROOT / "config" / "default.yaml", "--out", path]

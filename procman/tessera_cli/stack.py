@@ -1,6 +1,5 @@
 """All processes of one run. Extractors that die are started again; any other death ends the run."""
 
-import signal
 import time
 from pathlib import Path
 
@@ -75,7 +74,7 @@ class Stack:
 
     def end_source(self) -> None:
         """Asks the camera to end its stream; it does not count as a death."""
-        self.processes["camera"].signal(signal.SIGTERM)
+        self.processes["camera"].ask_to_end()
         self._is_source_ended = True
 
     def stop(self) -> None:
@@ -87,19 +86,19 @@ class Stack:
 
     def kill(self) -> None:
         for process in self.processes.values():
-            process.signal(signal.SIGKILL)
+            process.kill()
         _wait_for_all(list(self.processes.values()))
 
 
 def _end(processes: list[StageProcess], warnings: list[str]) -> None:
     for process in processes:
-        process.signal(signal.SIGTERM)
+        process.ask_to_end()
     if _wait_for_all(processes):
         return
     for process in processes:
         if process.pid is not None:
             warnings.append(f"{process.name} did not end within {STOP_TIMEOUT_S:.0f} s and was killed.")
-            process.signal(signal.SIGKILL)
+            process.kill()
     _wait_for_all(processes)
 
 

@@ -92,7 +92,7 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
     if not estimate.has_times and len(estimate.positions) != len(truth.positions):
         raise UserError(f"KITTI files go together by row, but one has {len(estimate.positions)} rows and the other {len(truth.positions)}.")
     try:
-        true_path, estimated_path = sync.associate_trajectories(_to_evo(truth), _to_evo(estimate), MAX_TIME_DIFFERENCE_S)
+        true_path, estimated_path = sync.associate_trajectories(_to_evo(truth), _to_evo(estimate), max_diff=MAX_TIME_DIFFERENCE_S)
     except sync.SyncException as error:
         raise UserError("no two poses of the trajectories have the same time.") from error
     if true_path.num_poses < MIN_POSES:

@@ -35,7 +35,7 @@ class Wall:
 def make_texture(generator: np.random.Generator) -> np.ndarray:
     """Random squares of several sizes on top of each other: corners at every scale. TEXTURE_SIZE^2, repeats."""
     texture = np.zeros((TEXTURE_SIZE, TEXTURE_SIZE))
-    for cell, weight in ((64, 0.25), (16, 0.35), (4, 0.4)):
+    for cell, weight in ((128, 0.3), (32, 0.35), (8, 0.35)):
         squares = generator.random((TEXTURE_SIZE // cell, TEXTURE_SIZE // cell))
         texture += weight * np.kron(squares, np.ones((cell, cell)))
     # A slight blur keeps distant texels from flickering between frames.
