@@ -93,7 +93,7 @@ void Play(FrameSource& source, int64_t map_delay_frames, Run& run) {
 double RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,
                 bool with_scale) {
   const auto max_num = static_cast<Eigen::Index>(truth.size());
-  Eigen::Matrix3Xd a(3, max_num), b(3, max_num);
+  Eigen::MatrixXd a(3, max_num), b(3, max_num);
   Eigen::Index num = 0;
   for (const GroundTruthPose& pose : truth) {
     const auto found = estimate.find(pose.frame);
@@ -104,11 +104,11 @@ double RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<Gro
   if (num < 3) return -1.0;
   a.conservativeResize(3, num);
   b.conservativeResize(3, num);
-  const Eigen::Matrix4d b_from_a = Eigen::umeyama(a, b, with_scale);
+  const Eigen::MatrixXd b_from_a = Eigen::umeyama(a, b, with_scale);
   double sum = 0.0;
   for (Eigen::Index i = 0; i < num; ++i) {
-    const Eigen::Vector4d moved = b_from_a * a.col(i).homogeneous();
-    sum += (moved.head<3>() - b.col(i)).squaredNorm();
+    const Eigen::Vector3d moved = b_from_a.topLeftCorner(3, 3) * a.col(i) + b_from_a.topRightCorner(3, 1);
+    sum += (moved - b.col(i)).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(num));
 }
