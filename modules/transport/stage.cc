@@ -137,7 +137,7 @@ double ResidentMb() {
 
 template <class Value>
 int AddOutlet(StageContext::Impl& engine, const Channel& channel, bool is_exclusive) {
-  const bool is_repaired = kDelivery<Value> != Delivery::kUnordered;
+  const bool is_repaired = kDelivery<Value> != Delivery::kUnordered && engine.BusOf(channel).can_listen();
   const auto history_bytes = static_cast<size_t>(is_repaired ? engine.setup_.settings.Get<int>("stream.history_bytes") : 0);
   engine.outlets_.push_back(std::make_unique<StageContext::Impl::Outlet>(
       StageContext::Impl::Outlet{channel, engine.WireName(channel), engine.SharedBusOf(channel), StreamHistory(history_bytes),
@@ -257,6 +257,7 @@ void StageContext::Impl::OnRepair(const RepairRequest& request) {
 }
 
 void StageContext::Impl::SendHeartbeat() {
+  if (heartbeat_outlet_ < 0) return;  // a log is written: nobody listens
   Heartbeat heartbeat;
   heartbeat.host = status_.host;
   heartbeat.pid = status_.pid;
