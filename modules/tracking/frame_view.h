@@ -5,15 +5,13 @@
 #include <cstdint>
 
 #include "features/feature_types.h"
+#include "features/pyramid.h"
 #include "geometry/reprojection.h"
 #include "tracking/feature_grid.h"
 
 namespace tessera {
 
 inline constexpr double kLevelScale = 1.2;  // one pixel of level l is kLevelScale^l pixels of level 0
-
-// kLevelScale^level
-double LevelScale(int level);
 
 // Never changes once made; keyframes share it with the frame that they came from.
 class FrameView {
