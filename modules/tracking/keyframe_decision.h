@@ -11,10 +11,10 @@
 namespace tessera {
 
 struct KeyframeDecisionOptions {
-  double min_share = 0.4;           // of the reference's points that must still be seen at the next frame
+  double min_share = 0.5;           // of the reference's points that must still be seen at the next frame
   double min_parallax_rad = 0.035;  // 2 degrees of median parallax to the reference: new points can be placed well
   double min_still_share = 0.9;     // parallax alone is no reason while more than this is still seen
-  int min_points = 200;             // a frame that sees fewer known points becomes a keyframe if anything moved
+  int min_points = 150;             // a frame that sees fewer known points becomes a keyframe if anything moved
   int64_t max_interval_us = 2000000;  // moving or not, not longer than this, if anything moved
   int min_new_points = 70;          // stereo, RGB-D: near keypoints that see no known point ...
   int max_known_points = 100;       // ... while fewer near keypoints than this see one

@@ -13,6 +13,10 @@ namespace tessera {
 
 inline constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;  // as DescribeLandmark takes it
 
+// Standard deviation of a keypoint's coordinates, pixels of its level: what residuals of bundle adjustment show (0.55),
+// and some of the map's error. A wider one lets corners in that only look alike; they make motion come out too small.
+inline constexpr double kKeypointSigmaPx = 0.7;
+
 // A structured-light camera measures depth as a disparity over the distance of projector and camera: 75 mm in those in
 // use (Kinect, Xtion). The stereo baseline for a stereo camera; 0 for mono.
 inline constexpr double kRgbdBaseline = 0.075;

@@ -293,9 +293,12 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
     }
   }
   SentKeyframe sent{reference, reference_from_camera, {}};
+  // Points that one view alone placed are no measure of what should be seen again, unless there are no others.
+  const bool has_known_points = frame.NumPoints() > 0;
+  if (has_known_points) decision_.Restart(frame);
   PlaceDepthPoints(frame, keyframe.id, sent);
+  if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
-  decision_.Restart(frame);
   reference_ = keyframe.id;
   ++next_keyframe_.value;
   if (last_) last_->reference_from_camera = Rigid3::Identity();

@@ -27,7 +27,7 @@ struct MapTrackerOptions {
   MatchOptions matching;
   KeyframeDecisionOptions keyframes;
   PoseOptimizationOptions pose;
-  double sigma_px = 1.0;             // standard deviation of a keypoint's coordinates at level 0
+  double sigma_px = kKeypointSigmaPx;  // standard deviation of a keypoint's coordinates at level 0
   int min_start_points = 150;        // stereo, RGB-D: keypoints with depth that a first keyframe needs
   int min_last_matches = 20;         // fewer from the last frame: look in wider windows
   int min_inliers = 25;              // points that a pose must agree with

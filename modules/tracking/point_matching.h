@@ -13,7 +13,7 @@ namespace tessera {
 
 struct MatchOptions {
   double last_radius_px = 15.0;    // around the prediction from the last frame, at level 0; times the scale of the level
-  double local_radius_px = 4.0;    // around the projection with a pose that is nearly right; likewise
+  double local_radius_px = 3.0;    // around the projection with a pose that is nearly right; likewise
   int max_hamming = 100;           // bits of 256: patches of one point under changed view, nearly always
   double max_hamming_ratio = 0.8;  // best match to the second best
 

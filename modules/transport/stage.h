@@ -77,8 +77,8 @@ class StageContext {
 
   // Calls `task` about every `period`. For liveness and output only; no result may depend on it.
   void Every(std::chrono::milliseconds period, std::function<void()> task);
-  // Runs `task` once the messages that are waiting now have been handled (again and again while it returns true):
-  // the main loop of a stage that makes its own work, such as the camera.
+  // Runs `task` whenever no message waits: again at once while it returns true, else after the next message or timer.
+  // The main loop of a stage that makes its own work, such as the camera.
   void WhenIdle(std::function<bool()> task);
 
   // The stage has sent its last value. It stays to repair what others missed until it is told to stop (SIGTERM,

@@ -107,7 +107,7 @@ TEST(Mapper, StereoBuildsAMapFromDepthUnderNoise) {
   EXPECT_LT(WrongShare(mapper.map(), drive), 0.02);
   mapper.map().keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
     const Rigid3 truth = world.Pose(static_cast<double>(keyframe.features->frame.value));
-    EXPECT_LT(CenterError(keyframe.world_from_camera, truth), 0.03);
+    EXPECT_LT(CenterError(keyframe.world_from_camera, truth), 0.06);  // 1 % of the way
   });
 }
 

@@ -22,7 +22,6 @@ class CameraStage {
   CameraStage& operator=(const CameraStage&) = delete;
 
  private:
-  void Wake();
   bool Step();
   void ReadNext();
   void SendNext();
@@ -42,7 +41,6 @@ class CameraStage {
   int64_t num_sent_ = 0;
   FrameId last_sent_;
   int64_t last_progress_us_ = 0;  // when a frame was last sent or a pose last came
-  bool is_awake_ = false;         // Step() is waiting for its turn
   bool has_ended_ = false;
   bool warned_ = false;
 };
