@@ -39,7 +39,7 @@ double BaselineOf(const CameraCalibration& calibration, double rgbd_baseline_m) 
 
 }  // namespace
 
-double LevelScale(int level) {
+double ScaleOfLevel(int level) {
   static const std::array<double, kMaxLevel + 1> scales = MakeLevelScales();
   return scales[static_cast<size_t>(std::clamp(level, 0, kMaxLevel))];
 }
