@@ -69,7 +69,7 @@ Associations AssociateByProjection(std::span<const LocalLandmark> landmarks, con
       continue;
     }
     result.is_expected[i] = 1;
-    const double radius_px = options.radius_px * LevelScale(expected->level);
+    const double radius_px = options.radius_px * ScaleOfLevel(expected->level);
     const BestMatch best = FindKeypoint(landmarks[i], *expected, frame, radius_px);
     if (best.IsClear(options.matching)) {
       result.matches.push_back({static_cast<int32_t>(i), best.index, best.distance});

@@ -32,7 +32,7 @@ std::vector<char> FreeMarks(const OdometryKeyframe& keyframe) {
 bool AgreesWithScale(const PointView& a, const PointView& b, int level_a, int level_b, const Eigen::Vector3d& point) {
   constexpr double kMaxFactor = 1.5 * kLevelScale;  // half a level of rounding each, and slant
   const double distance_ratio = (a.camera_from_world * point).norm() / (b.camera_from_world * point).norm();
-  const double scale_ratio = LevelScale(level_b) / LevelScale(level_a);
+  const double scale_ratio = ScaleOfLevel(level_b) / ScaleOfLevel(level_a);
   return distance_ratio < kMaxFactor * scale_ratio && scale_ratio < kMaxFactor * distance_ratio;
 }
 

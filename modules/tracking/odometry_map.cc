@@ -128,7 +128,7 @@ void OdometryMap::Describe(LandmarkId id, const PointRefinement& point) {
     const OdometryKeyframe& seer = keyframe(sighting.keyframe);
     const Eigen::Vector3d to_camera = seer.camera_from_world.Inverse().translation - described.position_in_world;
     described.normal += to_camera.normalized();
-    described.reach = to_camera.norm() * LevelScale(seer.view->keypoint(sighting.keypoint).level);
+    described.reach = to_camera.norm() * ScaleOfLevel(seer.view->keypoint(sighting.keypoint).level);
     descriptors.push_back(seer.view->descriptor(sighting.keypoint));
   }
   described.normal.normalize();

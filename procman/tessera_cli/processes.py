@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import re
 import signal
 import subprocess
 import time
@@ -73,8 +74,9 @@ class StageProcess:
         try:
             lines = [line for line in self.log_path.read_text(errors="replace").splitlines() if line.strip()]
         except OSError:
-            return ""
-        return lines[-1].strip() if lines else ""
+            lines = []
+        # A stage names itself first; who quotes its words has named it already.
+        return re.sub(r"^tessera-[a-z-]+: ", "", lines[-1].strip()) if lines else "(it said nothing)"
 
 
 def describe_exit(status: int) -> str:

@@ -1,7 +1,7 @@
 """tessera record: a source into an LCM log that stock lcm-logplayer can play.
 
-The camera process writes into the log as fast as it can read its source. LCM stamps each event with the time of writing;
-a player paces itself by these stamps, so they are replaced by the times at which the frames were taken.
+The camera process writes into the log as fast as it can read its source; the events carry the times at which the frames
+were taken, so that a player keeps the true pace.
 """
 
 import os
@@ -19,7 +19,7 @@ from tessera_cli.interrupt import Interrupt
 from tessera_cli.panel import LINE_PERIOD_S
 from tessera_cli.processes import StageProcess, describe_exit
 from tessera_cli.sources import Source, parse_source
-from tessera_cli.types import camera_image_t
+from tessera_cli.types import end_of_stream_t
 
 POLL_S = 0.05
 
@@ -29,15 +29,14 @@ def main(arguments: Namespace) -> int:
     if not source.has_camera_process:
         raise UserError(f"{arguments.source} is on the bus already: record it with .venv/bin/lcm-logger.")
     log = _check_target(arguments.log)
-    written, stamped = unfinished(log), log.with_name(f".stamped-{log.name}")
+    written = unfinished(log)
     try:
         with tempfile.TemporaryDirectory(prefix="tessera-record-") as folder:
             _write_log(arguments, source, written, Path(folder))
-        num_frames = stamp_by_frame_time(written, stamped, settings.prefix_of(arguments.settings))
-        os.replace(stamped, log)
+        num_frames = count_frames(written, settings.prefix_of(arguments.settings))
+        os.replace(written, log)
     finally:
         written.unlink(missing_ok=True)
-        stamped.unlink(missing_ok=True)
     print(f"tessera: {num_frames} frames, {log.stat().st_size / 1e6:.1f} MB in {log}")
     return 0
 
@@ -83,21 +82,10 @@ def _wait(camera: StageProcess, interrupt: Interrupt, log: Path) -> int:
     return status
 
 
-def stamp_by_frame_time(written: Path, stamped: Path, channel_prefix: str) -> int:
-    """Copies a log; each event gets the time of the frame that it belongs to or follows. Returns the number of frames."""
-    frames: set[int] = set()
-    first_utime = None
-    with_times = lcm.EventLog(str(stamped), "w", overwrite=True)
-    events = lcm.EventLog(str(written), "r")
-    stamp = began = int(time.time() * 1e6)
-    for event in events:
-        if event.channel == f"{channel_prefix}CAMERA":
-            image = camera_image_t.decode(event.data)
-            frames.add(image.frame)
-            first_utime = image.utime if first_utime is None else first_utime
-            # Never back: a player would wait for ever.
-            stamp = max(stamp, began + image.utime - first_utime)
-        with_times.write_event(stamp, event.channel, event.data)
+def count_frames(log: Path, channel_prefix: str) -> int:
+    events = lcm.EventLog(str(log), "r")
+    numbers = [end_of_stream_t.decode(event.data).num_frames for event in events if event.channel == f"{channel_prefix}END_OF_STREAM"]
     events.close()
-    with_times.close()
-    return len(frames)
+    if not numbers:
+        raise RunFailed(f"the camera wrote no end of its stream into {log}.")
+    return numbers[-1]

@@ -118,19 +118,19 @@ std::optional<int32_t> PairSearch::BestOnLine(int32_t keypoint, const PixelObser
   int best_distance = options_.max_hamming + 1, second_distance = 257;
   int32_t best = -1;
   Eigen::Vector2d best_px = Eigen::Vector2d::Zero();
-  const double margin_px = std::sqrt(kLineChi2) * LevelScale(kTopLevel);
+  const double margin_px = std::sqrt(kLineChi2) * ScaleOfLevel(kTopLevel);
   grid_.VisitSegment(a, b, margin_px, [&](int32_t candidate) {
     const Keypoint& to = second_.features->keypoints[Index(candidate)];
     if (second_.landmarks[Index(candidate)].valid() || std::abs(int{to.level} - int{from.level}) > 2) return;
     const Eigen::Vector2d offset = Eigen::Vector2d(to.x_px, to.y_px) - a;
-    const double limit = std::sqrt(kLineChi2) * LevelScale(to.level);
+    const double limit = std::sqrt(kLineChi2) * ScaleOfLevel(to.level);
     const double place = unit.dot(offset), aside = unit.x() * offset.y() - unit.y() * offset.x();
     if (std::abs(aside) > limit || place < -limit || place > length + limit) return;
     if (!AreAnglesNear(from.angle, to.angle, roll_)) return;
     const int distance = HammingDistance(descriptor, second_.features->descriptors[Index(candidate)]);
     const Eigen::Vector2d to_px(to.x_px, to.y_px);
     // The same corner found on another level is no rival.
-    const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
+    const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * ScaleOfLevel(to.level);
     if (distance < best_distance) {
       if (is_elsewhere && best >= 0) second_distance = best_distance;
       best_distance = distance;
