@@ -256,7 +256,8 @@ TEST(AdjustBundle, ValuesThatAreNotFiniteGiveNothing) {
       [](BundleProblem& p) { p.poses[0].camera_from_world.rotation.w() = kNaN; },
       [](BundleProblem& p) { p.points[7].position_in_world.y() = std::numeric_limits<double>::infinity(); },
       [](BundleProblem& p) { p.observations[9].seen.pixel_px.y() = kNaN; },
-      [](BundleProblem& p) { p.observations[9].seen.right_x_px = kNaN; },
+      // Not a number there means that no column is known (kNoColumn), which is fine.
+      [](BundleProblem& p) { p.observations[9].seen.right_x_px = std::numeric_limits<double>::infinity(); },
   };
   for (size_t i = 0; i < spoilers.size(); ++i) {
     BundleProblem problem = bundle.problem;
