@@ -71,10 +71,18 @@ def test_transport_alone_sees_lcm():
 
 def test_pure_modules_have_no_clock_and_no_threads():
     """Logical time only: below transport nothing reads a clock or starts a thread."""
-    forbidden = {"chrono", "ctime", "time.h", "sys/time.h", "thread", "mutex", "atomic", "future", "random"}
+    forbidden = {"chrono", "ctime", "time.h", "sys/time.h", "thread", "mutex", "atomic", "future"}
     wrong = [f"{path.relative_to(MODULES)} includes <{header}>"
              for path in sources() if layer_of(path) not in ("transport", "stages")
              for _, header in includes(path) if header in forbidden]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_pure_modules_draw_no_numbers_that_differ():
+    """A seeded Mersenne Twister gives the same numbers everywhere; these do not."""
+    forbidden = re.compile(r"random_device|\bs?rand\(|default_random_engine|std::\w+_distribution|std::shuffle")
+    wrong = [f"{path.relative_to(MODULES)} uses {found[0]}"
+             for path in sources() if (found := forbidden.search(path.read_text()))]
     assert not wrong, "\n".join(wrong)
 
 
