@@ -134,7 +134,8 @@ def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence):
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
     second = tessera.command("run", f"kitti:{sequence}", "--port", port, "--out", tessera.next_folder().with_name("second"))
     first.send_signal(signal.SIGTERM)
-    first.communicate(timeout=RUN_TIMEOUT_S)
+    out, _ = first.communicate(timeout=RUN_TIMEOUT_S)
+    assert "another stack" not in out
     assert second.status == 2, second.out + second.err
     assert "--port" in second.err
 
@@ -178,7 +179,7 @@ def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path):
 def publish_noise(port: int, generator: random.Random) -> None:
     """A hundred messages of random bytes on every channel of every bus, and datagrams that are no LCM at all."""
     channels = ("CAMERA", "CALIBRATION", "GROUND_TRUTH", "END_OF_STREAM", "EXTRACTOR_READY", "TILE_ACK", "TILE_FEATURES", "FEATURES", "POSE",
-                "KEYFRAME", "STATUS", "HEARTBEAT", "REPAIR", "TILE_0", "TILE_1", "")
+                "KEYFRAME", "STATUS", "HEARTBEAT", "REPAIR", "TILE_0", "TILE_1", "UNKNOWN")
     buses = [lcm.LCM(f"udpm://239.255.76.67:{port + offset}?ttl=0") for offset in (0, 1, 2, 13, 14)]
     raw = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for _ in range(100):
