@@ -1,6 +1,7 @@
 """Listens to STATUS and POSE on the main bus, and keeps the Progress of a run."""
 
 import os
+import select
 import struct
 import time
 from collections.abc import Callable
@@ -42,7 +43,9 @@ class BusListener:
         """Handles what comes within this time."""
         deadline = time.monotonic() + milliseconds / 1000
         while (left_s := deadline - time.monotonic()) > 0:
-            self._lcm.handle_timeout(int(left_s * 1000) + 1)
+            # Waiting inside LCM would turn a signal into an error.
+            if select.select([self._lcm.fileno()], [], [], left_s)[0]:
+                self._lcm.handle_timeout(0)
 
     def is_free(self) -> bool:
         """Whether nobody speaks on the bus, which every stage does ten times a second."""
