@@ -13,7 +13,7 @@ from tessera_cli.sources import Source
 GROUP = "239.255.76.67"
 FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
 # Keys that the command itself fills in.
-RESERVED = {"evaluator.out_dir": "--out DIR", "camera.source": "SOURCE"}
+RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE"}
 
 
 def bus_url(port: int) -> str:
@@ -52,6 +52,8 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
     assignments += [f"camera.pace={pace}", f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
     if arguments.record:
         assignments += [f"recorder.path={out_dir / 'run.lcmlog'}", f"recorder.num_extractors={arguments.extractors}"]
+    if arguments.record:
+        assignments.append(f"recorder.path={out_dir / 'run.lcmlog'}")
     if arguments.features:
         assignments.append(f"features.num_features={arguments.features}")
     return assignments + user_assignments(arguments)
