@@ -6,6 +6,7 @@
 #include <Eigen/SVD>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "geometry/reprojection.h"
 
@@ -13,6 +14,7 @@ namespace tessera {
 namespace {
 
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
+using Vector5d = Eigen::Matrix<double, 5, 1>;
 using Vector9d = Eigen::Matrix<double, 9, 1>;
 
 // Unit vector that `normal` (symmetric) shrinks most, as a row-major 3x3 matrix. nullopt if a second vector is shrunk
@@ -40,9 +42,37 @@ Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
 
 // The motion one step of (rotation [rad], direction of translation [rad in its tangent plane]) away.
 Rigid3 StepMotion(const Rigid3& motion, const Eigen::Matrix<double, 3, 2>& basis,
-                  const Eigen::Matrix<double, 5, 1>& step) {
+                  const Vector5d& step) {
   const Eigen::Vector3d t = motion.translation + basis * step.tail<2>();
   return {(ExpSO3(step.head<3>()) * motion.rotation).normalized(), t.normalized()};
+}
+
+struct MotionEquations {
+  Eigen::Matrix<double, 5, 5> information = Eigen::Matrix<double, 5, 5>::Zero();
+  Vector5d gradient = Vector5d::Zero();
+};
+
+// Normal equations of the Huber-weighted Sampson distances; derivatives are numeric: five more essential matrices.
+MotionEquations Linearize(std::span<const RayPair> pairs, const Rigid3& motion,
+                          const Eigen::Matrix<double, 3, 2>& basis, double corner) {
+  constexpr double kStep = 1e-7;  // rad
+  const Eigen::Matrix3d essential = EssentialFromMotion(motion);
+  std::array<Eigen::Matrix3d, 5> moved;
+  for (int k = 0; k < 5; ++k) {
+    moved[static_cast<size_t>(k)] = EssentialFromMotion(StepMotion(motion, basis, kStep * Vector5d::Unit(k)));
+  }
+  MotionEquations equations;
+  for (const RayPair& pair : pairs) {
+    const double distance = SampsonDistance(essential, pair);
+    Vector5d by_step;
+    for (int k = 0; k < 5; ++k) {
+      by_step(k) = (SampsonDistance(moved[static_cast<size_t>(k)], pair) - distance) / kStep;
+    }
+    const double weight = HuberWeight(distance * distance, corner * corner);
+    equations.information.noalias() += weight * by_step * by_step.transpose();
+    equations.gradient += weight * distance * by_step;
+  }
+  return equations;
 }
 
 }  // namespace
@@ -139,40 +169,34 @@ std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography) {
   return motions;
 }
 
-Rigid3 RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
-                    int max_iterations) {
-  constexpr double kStep = 1e-7;  // of the numeric derivative by the five parameters
-  using Vector5d = Eigen::Matrix<double, 5, 1>;
-  Rigid3 motion{second_from_first.rotation, second_from_first.translation.normalized()};
+RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
+                           int max_iterations) {
+  RefinedMotion result;
+  result.second_from_first = {second_from_first.rotation, second_from_first.translation.normalized()};
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(motion.translation);
-    const Eigen::Matrix3d essential = EssentialFromMotion(motion);
-    std::array<Eigen::Matrix3d, 5> moved;
-    for (int k = 0; k < 5; ++k) {
-      moved[static_cast<size_t>(k)] = EssentialFromMotion(StepMotion(motion, basis, kStep * Vector5d::Unit(k)));
-    }
-    Eigen::Matrix<double, 5, 5> information = Eigen::Matrix<double, 5, 5>::Zero();
-    Vector5d gradient = Vector5d::Zero();
-    for (const RayPair& pair : pairs) {
-      const double distance = SampsonDistance(essential, pair);
-      Vector5d by_step;
-      for (int k = 0; k < 5; ++k) {
-        by_step(k) = (SampsonDistance(moved[static_cast<size_t>(k)], pair) - distance) / kStep;
-      }
-      const double weight = HuberWeight(distance * distance, corner * corner);
-      information.noalias() += weight * by_step * by_step.transpose();
-      gradient += weight * distance * by_step;
-    }
-    const Vector5d step = information.ldlt().solve(-gradient);
+    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(result.second_from_first.translation);
+    const MotionEquations equations = Linearize(pairs, result.second_from_first, basis, corner);
+    result.information = equations.information;
+    const Vector5d step = equations.information.ldlt().solve(-equations.gradient);
     if (!step.allFinite() || step.norm() > 1.0) {
       break;
     }
-    motion = StepMotion(motion, basis, step);
+    result.second_from_first = StepMotion(result.second_from_first, basis, step);
     if (step.norm() < 1e-8) {
       break;
     }
   }
-  return motion;
+  return result;
+}
+
+double DirectionSigma(const RefinedMotion& motion, double sigma) {
+  const Eigen::Matrix<double, 5, 5> covariance = motion.information.inverse();
+  if (!covariance.allFinite()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const Eigen::Matrix2d of_direction = covariance.bottomRightCorner<2, 2>();
+  const double largest = of_direction.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff();
+  return largest > 0.0 ? sigma * std::sqrt(largest) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace tessera

@@ -40,9 +40,20 @@ std::vector<Rigid3> MotionsFromEssential(const Eigen::Matrix3d& essential);
 // rotation.
 std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography);
 
+struct RefinedMotion {
+  Rigid3 second_from_first;
+  // Inverse covariance of (rotation [rad], direction of t in its tangent plane [rad]), for errors of standard deviation
+  // 1 ray unit: divide by their variance.
+  Eigen::Matrix<double, 5, 5> information = Eigen::Matrix<double, 5, 5>::Zero();
+};
+
 // Refines R and the direction of t of second_from_first by Gauss-Newton on the Huber-weighted Sampson distances, which
 // to first order is the reprojection error minimised over all points as well. `corner` is Huber's, in ray units.
-Rigid3 RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
-                    int max_iterations = 10);
+RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
+                           int max_iterations = 10);
+
+// Standard deviation of the direction of translation in its worst direction, radians, for errors of `sigma` ray units;
+// infinite if the pairs don't fix it.
+double DirectionSigma(const RefinedMotion& motion, double sigma);
 
 }  // namespace tessera

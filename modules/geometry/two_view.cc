@@ -22,8 +22,8 @@ struct Problem {
 };
 
 struct Candidate {
-  Rigid3 second_from_first;
-  std::vector<std::optional<Eigen::Vector3d>> points;
+  RefinedMotion motion;
+  std::vector<std::optional<Eigen::Vector3d>> points;  // by pair; nullopt: not a good point
   int num_points = 0;
   double cost = 0.0;  // see Cost()
 };
@@ -91,10 +91,11 @@ std::optional<Eigen::Vector3d> GoodPoint(const Problem& problem, const Rigid3& m
   return point;
 }
 
-// Refines the motion on the pairs that agree with it, twice, since better motion finds more of them.
-Rigid3 RefineOnInliers(const Problem& problem, Rigid3 motion) {
+// Refines the motion on the pairs that agree with it, twice, since a better motion finds more of them.
+RefinedMotion RefineOnInliers(const Problem& problem, const Rigid3& motion) {
+  RefinedMotion refined{motion};
   for (int round = 0; round < 2; ++round) {
-    const Eigen::Matrix3d essential = EssentialFromMotion(motion);
+    const Eigen::Matrix3d essential = EssentialFromMotion(refined.second_from_first);
     std::vector<RayPair> inliers;
     for (const RayPair& pair : problem.rays) {
       const double distance = SampsonDistance(essential, pair);
@@ -102,12 +103,9 @@ Rigid3 RefineOnInliers(const Problem& problem, Rigid3 motion) {
         inliers.push_back(pair);
       }
     }
-    if (inliers.size() < 8) {
-      return motion;
-    }
-    motion = RefineMotion(inliers, motion, problem.corner);
+    refined = RefineMotion(inliers, refined.second_from_first, problem.corner);
   }
-  return motion;
+  return refined;
 }
 
 // Truncated squared errors of all pairs, in units of the limit: how ill the motion explains them. A pair whose point
@@ -129,11 +127,11 @@ double Cost(const Problem& problem, const Rigid3& motion) {
   return cost;
 }
 
-Candidate Evaluate(const Problem& problem, const Rigid3& motion) {
-  Candidate candidate{motion, {}, 0, Cost(problem, motion)};
+Candidate Evaluate(const Problem& problem, const RefinedMotion& motion) {
+  Candidate candidate{motion, {}, 0, Cost(problem, motion.second_from_first)};
   candidate.points.reserve(problem.rays.size());
   for (const RayPair& pair : problem.rays) {
-    candidate.points.push_back(GoodPoint(problem, motion, pair));
+    candidate.points.push_back(GoodPoint(problem, motion.second_from_first, pair));
     candidate.num_points += candidate.points.back().has_value() ? 1 : 0;
   }
   return candidate;
@@ -163,11 +161,20 @@ bool AreDifferent(const Rigid3& a, const Rigid3& b) {
   return LogSO3(a.rotation.conjugate() * b.rotation).norm() > 0.05 || a.translation.dot(b.translation) < 0.966;
 }
 
+// Whether a motion other than the best explains nearly as much.
+bool HasRival(const Problem& problem, const std::vector<Candidate>& candidates, const Candidate& best) {
+  const auto explained = [&](const Candidate& c) { return static_cast<double>(problem.rays.size()) - c.cost; };
+  return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& other) {
+    return explained(other) > problem.options.max_rival_share * explained(best) &&
+           AreDifferent(other.motion.second_from_first, best.motion.second_from_first);
+  });
+}
+
 }  // namespace
 
 std::string TwoViewOptions::Check() const {
   if (!(sigma_px > 0.0) || ransac_iterations < 1 || min_points < 8 || !(min_parallax_rad > 0.0) ||
-      !(max_rival_share > 0.0)) {
+      !(max_rival_share > 0.0) || !(max_direction_sigma_rad > 0.0)) {
     return "two-view options must be positive, and min_points at least 8";
   }
   return "";
@@ -185,19 +192,11 @@ std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibratio
   }
   const auto best = std::min_element(candidates.begin(), candidates.end(),
                                      [](const auto& a, const auto& b) { return a.cost < b.cost; });
-  if (best == candidates.end() || best->num_points < options.min_points) {
+  if (best == candidates.end() || best->num_points < options.min_points || HasRival(problem, candidates, *best) ||
+      DirectionSigma(best->motion, options.sigma_px / calibration.fx_px) > options.max_direction_sigma_rad) {
     return std::nullopt;
   }
-  const auto num_explained = [&](const Candidate& candidate) {
-    return static_cast<double>(problem.rays.size()) - candidate.cost;
-  };
-  for (const Candidate& rival : candidates) {
-    if (num_explained(rival) > options.max_rival_share * num_explained(*best) &&
-        AreDifferent(rival.second_from_first, best->second_from_first)) {
-      return std::nullopt;
-    }
-  }
-  return TwoViewResult{best->second_from_first, best->points, best->num_points};
+  return TwoViewResult{best->motion.second_from_first, best->points, best->num_points};
 }
 
 }  // namespace tessera

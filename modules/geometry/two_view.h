@@ -23,7 +23,9 @@ struct TwoViewOptions {
   int ransac_iterations = 300;     // samples for each model: 8 good of 8 are met with 99 % at 60 % good matches
   int min_points = 60;             // points with good parallax and small error that a start needs
   double min_parallax_rad = 0.017; // 1 degree: a point's depth is then good to about sigma_px / (f * 0.017) ~ 10 %
-  double max_rival_share = 0.75;   // a different motion that explains more than this share of what the best does: ambiguous
+  double max_rival_share = 0.75;   // a different motion that explains more than this share of what the best explains
+                                   // makes the case ambiguous
+  double max_direction_sigma_rad = 0.03;  // of the translation: worse, and turning can't be told from moving aside
 
   // Empty if all is well, else one sentence.
   std::string Check() const;
@@ -39,8 +41,8 @@ struct TwoViewResult {
 // points), takes every motion that the best of each kind allows, refines each on all its inliers, and keeps the one
 // that explains the pairs best: least sum of truncated squared errors, points behind a camera counted as unexplained.
 // (Not the one with most points of good parallax: a wrong motion sideways gives parallax to all.) nullopt if fewer than
-// min_points have a small error and enough parallax, or if a clearly different motion explains nearly as much. `seed`
-// decides the samples.
+// min_points have a small error and enough parallax, if a clearly different motion explains nearly as much, or if the
+// direction of translation is poorly known. `seed` decides the samples.
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
                                              uint64_t seed, const TwoViewOptions& options);
 

@@ -9,7 +9,7 @@ SOURCE is one of
   kitti:DIR    a sequence folder of the KITTI odometry benchmark
   euroc:DIR    holds mav0/
   tum:DIR      TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt
-  video:FILE   any video file that OpenCV reads; needs --camera
+  video:FILE   any video file that OpenCV reads; needs --camera, or FILE.yaml beside it
   camera:N     V4L2 device /dev/videoN; needs --camera
   rtsp://...   network stream; needs --camera
   log:FILE     a log recorded by `tessera record`, `tessera run --record` or lcm-logger

@@ -1,6 +1,7 @@
 """Listens to STATUS and POSE on the main bus, and keeps the Progress of a run."""
 
 import os
+import select
 import struct
 import time
 from collections.abc import Callable
@@ -14,6 +15,8 @@ from tessera_cli.types import pose_t, stage_status_t
 TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
 # Poses come in bursts, and LCM's default of 30 would drop some.
 QUEUE_CAPACITY = 1000
+# A bus without a heartbeat for this long is free.
+FREE_BUS_MS = 250
 # What decoding raises on bytes that make no sense. The stages count them; for a display they are nothing.
 DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError)
 
@@ -23,8 +26,10 @@ class BusListener:
 
     def __init__(self, url: str, channel_prefix: str, owns_pid: Callable[[int], bool]):
         self.progress = Progress()
-        self.foreign: StageReport | None = None  # a living process of another stack on the same bus
+        self.foreign = ""  # a living process that was on this bus before us
+        self._began_us = int(time.time() * 1e6)
         self._owns_pid = owns_pid
+        self._channel_prefix = channel_prefix
         self._host = os.uname().nodename
         try:
             self._lcm = lcm.LCM(url)
@@ -38,8 +43,17 @@ class BusListener:
         """Handles what comes within this time."""
         deadline = time.monotonic() + milliseconds / 1000
         while (left_s := deadline - time.monotonic()) > 0:
-            if self._lcm.handle_timeout(int(left_s * 1000) + 1) == 0:
-                return
+            # Waiting inside LCM would turn a signal into an error.
+            if select.select([self._lcm.fileno()], [], [], left_s)[0]:
+                self._lcm.handle_timeout(0)
+
+    def is_free(self) -> bool:
+        """Whether nobody speaks on the bus, which every stage does ten times a second."""
+        heard = []
+        subscription = self._lcm.subscribe(self._channel_prefix + "HEARTBEAT", lambda _channel, data: heard.append(data))
+        self.listen(FREE_BUS_MS)
+        self._lcm.unsubscribe(subscription)
+        return not heard and not self.foreign
 
     def _on_status(self, _channel: str, data: bytes) -> None:
         try:
@@ -53,8 +67,8 @@ class BusListener:
             self.progress.stages[report.name] = report
             if report.name == "camera" and report.values.get("num_frames", 0) > 0:
                 self.progress.num_frames = int(report.values["num_frames"])
-        elif message.host == self._host and os.path.exists(f"/proc/{message.pid}"):
-            self.foreign = report
+        elif message.host == self._host and message.stage_epoch_us < self._began_us and os.path.exists(f"/proc/{message.pid}"):
+            self.foreign = f"{message.name}, process {message.pid}"
 
     def _on_pose(self, _channel: str, data: bytes) -> None:
         try:
@@ -67,7 +81,7 @@ class BusListener:
 
 def _to_report(message: stage_status_t) -> StageReport:
     return StageReport(
-        name=message.name, host=message.host, pid=message.pid, state=message.state, dropped=message.num_dropped,
+        name=message.name, host=message.host, pid=message.pid, epoch_us=message.stage_epoch_us, state=message.state, dropped=message.num_dropped,
         repaired=message.num_repaired, lost=message.num_lost, undecodable=message.num_undecodable, queue=message.queue,
         step_ms=message.step_median_ms, cpu_percent=message.cpu_percent, rss_mb=message.rss_mb,
         last_error=message.last_error, values=dict(zip(message.value_names, message.values)), heard_at=time.monotonic())

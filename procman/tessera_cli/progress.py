@@ -18,6 +18,7 @@ class StageReport:
     name: str
     host: str
     pid: int
+    epoch_us: int  # when it started, since 1970
     state: int
     dropped: int
     repaired: int

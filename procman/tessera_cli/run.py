@@ -68,19 +68,25 @@ class Launcher:
                 self._start(view)
                 began = time.monotonic()
                 ended = self._watch(view)
-                wall_s = time.monotonic() - began
                 self._stack.stop()
         except RunFailed as failure:
             self._stack.stop()
-            self._try_to_summarize(time.monotonic() - began, str(failure))
+            self._try_to_summarize(self._wall_s(began), str(failure))
             raise
         finally:
             self._stack.kill()
-        self._print_summary(wall_s, ended)
+        self._print_summary(self._wall_s(began), ended)
         return 0 if ended == "complete" or self._source.is_live else 1
+
+    def _wall_s(self, began: float) -> float:
+        """From the camera's start to the last pose."""
+        last_pose_at = self._bus.progress.last_pose_at
+        return max(0.0, last_pose_at - began) if last_pose_at else 0.0
 
     def _start(self, view) -> None:
         """The camera comes last: nobody misses its first frame."""
+        if self._source.has_camera_process and not self._bus.is_free():
+            raise UserError("another stack runs on this bus: end it, or give --port N to keep the two apart.")
         for stage in ("evaluator", "tracker", "reassembler", "dispatcher"):
             self._stack.start(stage)
         for instance in range(self._arguments.extractors):
@@ -132,8 +138,7 @@ class Launcher:
         self._bus.listen(LISTEN_MS)
         self._stack.check()
         if foreign := self._bus.foreign:
-            raise UserError(f"another stack runs on this bus ({foreign.name}, process {foreign.pid}): end it, or give --port N "
-                            "to keep the two apart.")
+            raise UserError(f"another stack runs on this bus ({foreign}): end it, or give --port N to keep the two apart.")
         for warning in self._stack.warnings[self._num_warnings_said:]:
             view.say(warning)
         self._num_warnings_said = len(self._stack.warnings)

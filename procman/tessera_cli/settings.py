@@ -13,7 +13,7 @@ from tessera_cli.sources import Source
 GROUP = "239.255.76.67"
 FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
 # Keys that the command itself fills in.
-RESERVED = {"evaluator.out_dir": "--out DIR", "camera.source": "SOURCE"}
+RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE"}
 
 
 def bus_url(port: int) -> str:

@@ -48,7 +48,7 @@ def parse_source(text: str) -> Source:
 
 
 def _stored_source(kind: str, rest: str) -> Source:
-    path = Path(rest).expanduser().absolute()
+    path = Path(rest).expanduser().resolve()
     if not rest:
         raise UserError(f"source '{kind}:' names no path.")
     if kind in FOLDERS and not path.is_dir():

@@ -23,7 +23,7 @@ class RunFacts:
     sensor: str
     extractors: int
     tiles: str
-    wall_s: float  # from the camera's start to the end of the stream
+    wall_s: float  # from the camera's start to the last pose
     ended: str  # "complete", "interrupted", or the sentence of a failure
     messages_undecodable: int
 

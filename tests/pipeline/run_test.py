@@ -1,0 +1,248 @@
+"""The real processes over UDP on a made sequence: every way of running gives the same trajectory, bit for bit."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import lcm
+import pytest
+
+from conftest import NUM_FRAMES, ROOT, RUN_TIMEOUT_S
+
+# All poses of the made sequence are known exactly; the room is 14 m wide.
+MAX_RMS_ERROR_M = 0.05
+SUMMARY_KEYS = {
+    "source", "sensor", "extractors", "tiles", "frames", "frames_tracked", "frames_lost", "frames_dropped", "tracking_failures",
+    "relocalizations", "keyframes", "landmarks", "loops_closed", "rms_error_m", "alignment", "wall_s", "frames_per_s", "pose_time_ms",
+    "latency_ms", "stage_ms", "cpu_s", "max_rss_mb", "messages_repaired", "messages_lost", "trajectory_sha256", "map_sha256"}
+LOGPLAYER = ROOT / ".venv" / "bin" / "lcm-logplayer"
+
+
+def must_equal(finished, reference) -> None:
+    finished.must_end_well()
+    for key in ("frames", "frames_tracked", "frames_dropped", "trajectory_sha256", "map_sha256"):
+        assert finished.summary[key] == reference.summary[key], key
+
+
+def wait_for(condition, what: str, timeout_s: float = RUN_TIMEOUT_S) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"waited in vain for {what}"
+        time.sleep(0.02)
+
+
+def pids_of(folder: Path, stage: str = "") -> list[int]:
+    """Processes whose settings are those of the run in `folder`."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if str(folder / "settings.yaml").encode() in words and Path(words[0].decode()).name.startswith(f"tessera-{stage}"):
+            found.append(int(entry.name))
+    return found
+
+
+def test_a_run_ends_well(reference_run):
+    summary = reference_run.summary
+    assert set(summary) >= SUMMARY_KEYS
+    assert summary["frames"] == NUM_FRAMES
+    assert summary["frames_dropped"] == summary["frames_lost"] == summary["tracking_failures"] == 0
+    assert summary["frames_tracked"] > 0.8 * NUM_FRAMES
+    assert summary["rms_error_m"] < MAX_RMS_ERROR_M
+    assert summary["messages_lost"] == 0
+    for name in ("camera", "dispatcher", "extractor_0", "reassembler", "tracker", "evaluator"):
+        assert summary["cpu_s"][name] > 0 and summary["max_rss_mb"][name] > 0
+
+
+def test_a_run_leaves_its_files(reference_run):
+    files = {path.name for path in reference_run.folder.iterdir()}
+    assert files >= {"trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt", "keyframes.txt", "summary.json", "trajectory.png",
+                     "settings.yaml", "stages"}
+    assert not [name for name in files if "unfinished" in name]
+    assert len((reference_run.folder / "trajectory_kitti.txt").read_text().splitlines()) == NUM_FRAMES
+
+
+def test_evaluate_repeats_the_error_of_the_run(tessera, reference_run):
+    finished = tessera.command("evaluate", reference_run.folder).must_end_well()
+    assert f"{reference_run.summary['rms_error_m']:.4f} m" in finished.out
+
+
+def test_cut_and_shared_out_gives_the_same(tessera, sequence, reference_run):
+    must_equal(tessera.run(f"kitti:{sequence}", "--extractors", 3, "--tiles", "2x4"), reference_run)
+
+
+def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, reference_run):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
+    poses = []
+    bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
+    bus.subscribe("POSE", lambda _channel, data: poses.append(data)).set_queue_capacity(1000)
+    wait_for(lambda: (bus.handle_timeout(20), len(poses) > NUM_FRAMES // 3)[1], "poses")
+    os.kill(pids_of(folder, "extractor")[0], signal.SIGKILL)
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 0, out
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["extractor_restarts"] == 1, out
+    assert "SIGKILL" in summary["warnings"][0]
+    assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
+
+
+def test_another_stage_that_is_killed_ends_the_run(tessera, sequence):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    os.kill(pids_of(folder, "reassembler")[0], signal.SIGKILL)
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 1, out
+    assert "reassembler was killed by SIGKILL" in out
+    assert not pids_of(folder)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_writes_what_it_has(tessera, sequence, number):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.5", "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    time.sleep(2.0)  # what is tried is an end somewhere in the middle
+    run.send_signal(number)
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 1, out
+    assert json.loads((folder / "summary.json").read_text())["ended"] == "interrupted"
+    assert not pids_of(folder)
+
+
+def test_no_stage_outlives_a_killed_launcher(tessera, sequence):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    run.kill()
+    run.wait()
+    wait_for(lambda: not pids_of(folder), "the end of all stages", timeout_s=10)
+
+
+def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    first = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    second = tessera.command("run", f"kitti:{sequence}", "--port", port, "--out", tessera.next_folder().with_name("second"))
+    first.send_signal(signal.SIGTERM)
+    out, _ = first.communicate(timeout=RUN_TIMEOUT_S)
+    assert "another stack" not in out
+    assert second.status == 2, second.out + second.err
+    assert "--port" in second.err
+
+
+@pytest.fixture(scope="module")
+def log(tessera, sequence, tmp_path_factory) -> Path:
+    log = tmp_path_factory.mktemp("logs") / "room 1.lcmlog"
+    finished = tessera.command("record", f"kitti:{sequence}", log).must_end_well()
+    assert f"{NUM_FRAMES} frames" in finished.out
+    assert [path.name for path in log.parent.iterdir()] == [log.name]
+    return log
+
+
+def test_a_recorded_log_is_replayed_to_the_same(tessera, log, reference_run):
+    must_equal(tessera.run(log, "--extractors", 2, command="replay"), reference_run)
+
+
+def test_stock_lcm_logplayer_feeds_the_stack(tessera, log, reference_run):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", "bus:", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
+    line = ""
+    while "waiting for frames" not in line:
+        line = run.stdout.readline()
+        assert line, "the stack ended before it was ready"
+    subprocess.run([LOGPLAYER, f"--lcm-url=udpm://239.255.76.67:{port}?ttl=0", log], check=True, capture_output=True, timeout=RUN_TIMEOUT_S)
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 0, out
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["frames_dropped"] == 0
+    assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
+
+
+def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path):
+    cut = tmp_path / "cut.lcmlog"
+    cut.write_bytes(log.read_bytes()[:log.stat().st_size // 2])
+    finished = tessera.run(cut, command="replay")
+    assert finished.status == 2, finished.out + finished.err
+    assert "cut.lcmlog" in finished.err and finished.err.count("\n") == 1
+
+
+def publish_noise(port: int, generator: random.Random) -> None:
+    """A hundred messages of random bytes on every channel of every bus, and datagrams that are no LCM at all."""
+    channels = ("CAMERA", "CALIBRATION", "GROUND_TRUTH", "END_OF_STREAM", "EXTRACTOR_READY", "TILE_ACK", "TILE_FEATURES", "FEATURES", "POSE",
+                "KEYFRAME", "STATUS", "HEARTBEAT", "REPAIR", "TILE_0", "TILE_1", "UNKNOWN")
+    buses = [lcm.LCM(f"udpm://239.255.76.67:{port + offset}?ttl=0") for offset in (0, 1, 2, 13, 14)]
+    raw = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    for _ in range(100):
+        for bus in buses:
+            for channel in channels:
+                bus.publish(channel, generator.randbytes(generator.choice((0, 1, 8, 60, 1000))))
+        raw.sendto(generator.randbytes(200), ("239.255.76.67", port))
+        time.sleep(0.005)
+
+
+def test_random_bytes_on_every_channel_are_counted_and_change_nothing(tessera, sequence, reference_run):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    publish_noise(port, random.Random(1))
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 0, out
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["messages_undecodable"] > 0
+    assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
+
+
+def test_stereo_is_the_same_for_every_cut(tessera, sequence):
+    whole = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--extractors", 1).must_end_well()
+    assert whole.summary["frames_tracked"] == NUM_FRAMES
+    assert whole.summary["rms_error_m"] < MAX_RMS_ERROR_M
+    must_equal(tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--extractors", 2, "--tiles", "2x2"), whole)
+
+
+def test_frames_choose_a_part(tessera, sequence):
+    finished = tessera.run(f"kitti:{sequence}", "--frames", "0:20").must_end_well()
+    assert finished.summary["frames"] == 20
+
+
+class TestDamagedInput:
+    """Each is one sentence and exit status 2."""
+
+    @pytest.fixture
+    def damaged(self, sequence, tmp_path) -> Path:
+        return Path(shutil.copytree(sequence, tmp_path / "damaged"))
+
+    def must_be_refused(self, tessera, folder: Path, word: str) -> None:
+        finished = tessera.run(f"kitti:{folder}")
+        assert finished.status == 2, finished.out + finished.err
+        assert word in finished.err and finished.err.count("\n") == 1, finished.err
+
+    def test_no_calibration(self, tessera, damaged):
+        (damaged / "calib.txt").unlink()
+        self.must_be_refused(tessera, damaged, "calib.txt")
+
+    def test_malformed_calibration(self, tessera, damaged):
+        (damaged / "calib.txt").write_text("P0: 300 zero\n")
+        self.must_be_refused(tessera, damaged, "calib.txt")
+
+    def test_too_few_times(self, tessera, damaged):
+        (damaged / "times.txt").write_text("0.0\n0.1\n")
+        self.must_be_refused(tessera, damaged, "times.txt")
+
+    def test_truncated_image(self, tessera, damaged):
+        image = damaged / "image_0" / "000030.pgm"
+        image.write_bytes(image.read_bytes()[:1000])
+        self.must_be_refused(tessera, damaged, "000030.pgm")
+
+    def test_image_of_another_size(self, tessera, damaged):
+        (damaged / "image_0" / "000030.pgm").write_bytes(b"P5 10 10 255\n" + bytes(100))
+        self.must_be_refused(tessera, damaged, "000030.pgm")
