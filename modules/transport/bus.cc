@@ -28,8 +28,9 @@ std::shared_ptr<Bus> OpenUdp(const std::string& url, int receive_buffer_bytes) {
   if (const std::string problem = CheckUdp(*address); !problem.empty()) {
     throw std::runtime_error(problem);
   }
-  const std::string asked = "recv_buf_size=" + std::to_string(receive_buffer_bytes);
-  const int granted = GrantedReceiveBuffer(receive_buffer_bytes);
+  // No more than the kernel grants: LCM would print a paragraph about the rest for each bus.
+  const int granted = std::min(GrantedReceiveBuffer(receive_buffer_bytes), receive_buffer_bytes);
+  const std::string asked = "recv_buf_size=" + std::to_string(granted);
   return std::make_shared<LcmBus>(url + (url.find('?') == std::string::npos ? "?" : "&") + asked,
                                   static_cast<size_t>(std::max(granted / 2, 1)));
 }

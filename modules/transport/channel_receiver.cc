@@ -73,6 +73,10 @@ std::optional<int64_t> ChannelReceiver::next_poll_us() const {
   return next;
 }
 
+void ChannelReceiver::Abandon() {
+  for (auto& [publisher, stream] : streams_) stream.receiver->Abandon();
+}
+
 StreamCounts ChannelReceiver::counts() const {
   StreamCounts counts = past_counts_;
   for (const auto& [publisher, stream] : streams_) {

@@ -32,6 +32,9 @@ class ChannelReceiver {
   std::vector<RepairRequest> Poll(int64_t now_us);
   std::optional<int64_t> next_poll_us() const;
 
+  // All streams are over: gives on what is there, counts what lacks.
+  void Abandon();
+
   const std::string& channel() const { return channel_; }
   StreamCounts counts() const;
 

@@ -85,7 +85,9 @@ LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(std::
 }
 
 LogFileWriter::~LogFileWriter() {
-  if (file_ != nullptr) std::fclose(file_);
+  if (file_ == nullptr) return;
+  std::fclose(file_);
+  std::remove((path_ + ".part").c_str());
 }
 
 void LogFileWriter::Write(int64_t time_us, const std::string& channel, ByteView data) {

@@ -45,7 +45,7 @@ class LogFileWriter {
   // Writes into PATH.part, which takes the name PATH when it is closed: no log is ever half written. Throws InputError
   // if it can't be written.
   explicit LogFileWriter(const std::string& path);
-  ~LogFileWriter();  // without Close(): leaves PATH.part
+  ~LogFileWriter();  // without Close(): nothing is kept
   LogFileWriter(const LogFileWriter&) = delete;
   LogFileWriter& operator=(const LogFileWriter&) = delete;
 

@@ -10,27 +10,42 @@
 namespace tessera {
 namespace {
 
+constexpr int64_t kWallStartUs = 1'600'000'000'000'000;  // any time will do
+
+class TestClock : public Clock {
+ public:
+  int64_t NowUs() const override { return now_us; }
+  int64_t WallUs() const override { return kWallStartUs + now_us; }
+
+  int64_t now_us = 0;
+};
+
 using Loses = std::function<bool(const std::string& channel)>;
 
-// Passes everything on but what is to be lost.
-class LossyBus : public Bus {
+// Passes everything on but what is to be lost, and lets it arrive by the test's clock.
+class TestBus : public Bus {
  public:
-  LossyBus(std::shared_ptr<Bus> bus, std::shared_ptr<Loses> loses) : bus_(std::move(bus)), loses_(std::move(loses)) {}
+  TestBus(std::shared_ptr<const TestClock> clock, std::shared_ptr<const Loses> loses)
+      : clock_(std::move(clock)), loses_(std::move(loses)), bus_(OpenBus("memq://", 0)) {}
 
   bool Publish(const std::string& channel, ByteView message, std::optional<int64_t> source_us) override {
     return (*loses_ && (*loses_)(channel)) || bus_->Publish(channel, message, source_us);
   }
   bool can_listen() const override { return true; }
   void Subscribe(const void* owner, const std::string& channel, Handler handler) override {
-    bus_->Subscribe(owner, channel, std::move(handler));
+    bus_->Subscribe(owner, channel,
+                    [clock = clock_, handler = std::move(handler)](const std::string& name, ByteView message, int64_t) {
+                      handler(name, message, clock->WallUs());
+                    });
   }
   void Unsubscribe(const void* owner) override { bus_->Unsubscribe(owner); }
   int file_descriptor() const override { return bus_->file_descriptor(); }
   bool HandleOne() override { return bus_->HandleOne(); }
 
  private:
+  std::shared_ptr<const TestClock> clock_;
+  std::shared_ptr<const Loses> loses_;
   std::shared_ptr<Bus> bus_;
-  std::shared_ptr<Loses> loses_;
 };
 
 }  // namespace
@@ -43,24 +58,30 @@ struct MemoryBus::Impl {
   // One round of all stages; moves the clock to the next thing that is due if none did anything.
   void Step();
   int64_t NumValues() const;
+  const Member* Find(const std::string& name) const;
 
   Settings settings;
-  int64_t now_us = 0;
+  std::shared_ptr<TestClock> clock = std::make_shared<TestClock>();
   std::shared_ptr<Loses> loses = std::make_shared<Loses>();
-  std::shared_ptr<Bus> bus;
+  std::shared_ptr<Bus> bus = std::make_shared<TestBus>(clock, loses);
   std::vector<Member> members;
+  int64_t num_started = 0;
 };
 
 void MemoryBus::Impl::Step() {
   bool did_something = false;
   int64_t due_us = INT64_MAX;
-  for (const Member& member : members) {
+  for (Member& member : members) {
     StageContext::Impl& engine = member.context->impl();
+    if (engine.stopped_) {
+      engine.Silence();
+      continue;
+    }
     did_something |= engine.Step();
     due_us = std::min(due_us, engine.NextDueUs());
   }
   if (!did_something) {
-    now_us = std::max(now_us + 1, due_us);
+    clock->now_us = std::max(clock->now_us + 1, due_us == INT64_MAX ? 0 : due_us);
   }
 }
 
@@ -68,18 +89,20 @@ void MemoryBus::Impl::Step() {
 int64_t MemoryBus::Impl::NumValues() const {
   int64_t num_values = 0;
   for (const Member& member : members) {
-    const StageStatus& status = member.context->impl().status_;
-    num_values += status.num_received + status.num_published;
+    const StageFigures& figures = member.context->impl().figures_;
+    num_values += figures.num_received + figures.num_published;
   }
   return num_values;
 }
 
+const MemoryBus::Impl::Member* MemoryBus::Impl::Find(const std::string& name) const {
+  const auto it = std::find_if(members.begin(), members.end(),
+                               [&](const Member& member) { return member.context->name() == name; });
+  return it == members.end() ? nullptr : &*it;
+}
+
 MemoryBus::MemoryBus(Settings settings) : impl_(std::make_unique<Impl>()) {
-  for (const char* key : {"bus.main_url", "bus.camera_url", "bus.work_url", "bus.tile_url"}) {
-    settings.Override(std::string(key) + "=memq://");
-  }
   impl_->settings = std::move(settings);
-  impl_->bus = std::make_shared<LossyBus>(OpenBus("memq://", 0), impl_->loses);
 }
 
 MemoryBus::~MemoryBus() {
@@ -88,37 +111,44 @@ MemoryBus::~MemoryBus() {
 
 StageContext& MemoryBus::AddContext(const std::string& name, int id) {
   Impl* impl = impl_.get();
-  StageContext::Impl::Setup setup;
-  setup.settings = impl->settings;
-  setup.name = name;
-  setup.id = id;
-  setup.now_us = [impl] { return impl->now_us; };
-  setup.open_bus = [impl](const std::string&) { return impl->bus; };
-  impl->members.push_back({std::make_unique<StageContext>(std::make_unique<StageContext::Impl>(std::move(setup))), nullptr});
+  StageContext::Impl::Setup setup{
+      .settings = impl->settings,
+      .identity = {.name = name,
+                   .id = id,
+                   .epoch_us = impl->clock->WallUs() + ++impl->num_started,
+                   .host = "memory",
+                   .pid = static_cast<int32_t>(impl->num_started)},
+      .clock = impl->clock,
+      .open_bus = [impl](const std::string&) { return impl->bus; },
+      .log = [](bool, const std::string&) {}};
+  impl->members.push_back(
+      {std::make_unique<StageContext>(std::make_unique<StageContext::Impl>(std::move(setup))), nullptr});
+  impl->members.back().context->impl().state_ = StageState::kRunning;
   return *impl->members.back().context;
 }
 
-void MemoryBus::Keep(const std::string& /*name*/, std::shared_ptr<void> stage) {
-  impl_->members.back().stage = std::move(stage);
+void MemoryBus::Keep(const std::string& name, std::shared_ptr<void> stage) {
+  for (Impl::Member& member : impl_->members) {
+    if (member.context->name() == name) member.stage = stage;
+  }
 }
 
 void MemoryBus::Kill(const std::string& name) {
-  const auto dead = std::find_if(impl_->members.begin(), impl_->members.end(),
-                                 [&](const Impl::Member& member) { return member.context->name() == name; });
-  if (dead == impl_->members.end()) {
+  const Impl::Member* dead = impl_->Find(name);
+  if (dead == nullptr) {
     throw std::invalid_argument("no stage " + name + " to kill");
   }
-  dead->context->impl().stopped_ = true;  // what its destructor says is not heard
-  dead->stage.reset();
-  impl_->members.erase(dead);
+  dead->context->impl().Silence();  // what its destructor says is not heard
+  impl_->members[static_cast<size_t>(dead - impl_->members.data())].stage.reset();
+  impl_->members.erase(impl_->members.begin() + (dead - impl_->members.data()));
 }
 
 void MemoryBus::LoseMessages(std::function<bool(const std::string& channel)> lose) { *impl_->loses = std::move(lose); }
 
 bool MemoryBus::RunUntil(const std::function<bool()>& done, double timeout_s) {
-  const int64_t end_us = impl_->now_us + static_cast<int64_t>(timeout_s * 1e6);
+  const int64_t end_us = impl_->clock->now_us + static_cast<int64_t>(timeout_s * 1e6);
   while (!done()) {
-    if (impl_->now_us > end_us) {
+    if (impl_->clock->now_us > end_us) {
       return false;
     }
     impl_->Step();
@@ -127,29 +157,26 @@ bool MemoryBus::RunUntil(const std::function<bool()>& done, double timeout_s) {
 }
 
 void MemoryBus::RunUntilQuiet(double quiet_s) {
+  const auto quiet_us = static_cast<int64_t>(quiet_s * 1e6);
   int64_t num_values = -1;
-  int64_t changed_us = impl_->now_us;
-  while (impl_->now_us - changed_us < static_cast<int64_t>(quiet_s * 1e6)) {
+  int64_t changed_us = impl_->clock->now_us;
+  while (impl_->clock->now_us - changed_us < quiet_us) {
     impl_->Step();
     if (const int64_t now = impl_->NumValues(); now != num_values) {
       num_values = now;
-      changed_us = impl_->now_us;
+      changed_us = impl_->clock->now_us;
     }
   }
 }
 
 int MemoryBus::exit_status(const std::string& name) const {
-  for (const Impl::Member& member : impl_->members) {
-    if (member.context->name() == name) return member.context->impl().exit_status_;
-  }
-  return 0;
+  const Impl::Member* member = impl_->Find(name);
+  return member == nullptr ? 0 : member->context->impl().exit_status_;
 }
 
 std::string MemoryBus::failure(const std::string& name) const {
-  for (const Impl::Member& member : impl_->members) {
-    if (member.context->name() == name) return member.context->impl().failure_;
-  }
-  return "";
+  const Impl::Member* member = impl_->Find(name);
+  return member == nullptr ? "" : member->context->impl().failure_;
 }
 
 }  // namespace tessera

@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "settings/settings.h"
+#include "transport/bytes.h"
 #include "transport/channels.h"
 #include "transport/stage_messages.h"
 
@@ -75,6 +76,12 @@ class StageContext {
   template <class Value>
   void Subscribe(const Channel& channel, std::function<void(const Value&, const MessageInfo&)> handler);
 
+  // For recording: `handler` gets every message of every bus, also of each extractor's, as it was sent (`channel` with
+  // prefix); streams from their first message on, in order and repaired. HEARTBEAT and REPAIR are left out: played
+  // again, they would speak of publishers that are gone.
+  using RawHandler = std::function<void(const std::string& channel, ByteView message, int64_t arrival_us)>;
+  void SubscribeAll(RawHandler handler);
+
   // Calls `task` about every `period`. For liveness and output only; no result may depend on it.
   void Every(std::chrono::milliseconds period, std::function<void()> task);
   // Runs `task` whenever no message waits: again at once while it returns true, else after the next message or timer.
@@ -86,7 +93,7 @@ class StageContext {
   void Finish();
   bool finished() const;
 
-  // Ends the process's loop with this exit status after one sentence.
+  // Ends the process's loop with this exit status after one sentence. Nothing but a last status is sent any more.
   void Fail(const std::string& sentence, int exit_status = 1);
 
   // Own figures for STATUS.

@@ -1,95 +1,107 @@
-// What stands behind a StageContext: buses, streams, timers and the stage's figures. RunStageMain drives it by the real
-// clock and poll(); MemoryBus by a clock of its own.
+// What stands behind a StageContext: buses, streams, timers and the stage's figures. RunStageMain drives it by the
+// computer's clock and poll(); MemoryBus by a clock of its own.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "settings/settings.h"
 #include "transport/bus.h"
-#include "transport/channel_receiver.h"
-#include "transport/codec.h"
+#include "transport/clock.h"
+#include "transport/incoming_streams.h"
+#include "transport/neighbours.h"
+#include "transport/outgoing_streams.h"
 #include "transport/stage.h"
-#include "transport/stream_history.h"
+#include "transport/stage_figures.h"
+#include "transport/stream_settings.h"
 
 namespace tessera {
-
-// A subscription of whatever type.
-class Inlet {
- public:
-  virtual ~Inlet() = default;
-  virtual void OnMessage(ByteView message, int64_t arrival_us) = 0;
-  virtual void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const StreamHead& head) = 0;
-  virtual std::vector<RepairRequest> Poll() = 0;
-  virtual std::optional<int64_t> next_poll_us() const = 0;
-  virtual StreamCounts counts() const = 0;
-  virtual const std::string& channel() const = 0;
-};
 
 struct StageContext::Impl {
   struct Setup {
     Settings settings;
-    std::string name;
-    int id = 0;
-    std::function<int64_t()> now_us;       // never jumps
+    StageIdentity identity;
+    std::shared_ptr<const Clock> clock;
     std::function<std::shared_ptr<Bus>(const std::string& url)> open_bus;
+    std::function<void(bool is_error, const std::string& sentence)> log;
   };
+  // Opens the main bus and listens there for who else is on it. Throws as OpenBus does.
   explicit Impl(Setup setup);
-  ~Impl();
 
-  struct Outlet {
-    Channel channel;
-    std::string wire_name;
-    std::shared_ptr<Bus> bus;
-    StreamHistory history;
-    bool is_exclusive = false;
-    bool is_repaired = false;
-  };
+  // --- for StageContext ---
+  std::shared_ptr<Bus> BusOf(const Channel& channel);
+  // Throws std::runtime_error if the channel already has another publisher.
+  int Advertise(const Channel& channel, Delivery delivery, bool is_exclusive);
+  template <class Value>
+  void Send(int stream, const Value& value);
+  template <class Value>
+  void Subscribe(const Channel& channel, std::function<void(const Value&, const MessageHeader&, int64_t arrival_us)> handler);
+  void SubscribeAll(const IncomingStreams::RawHandler& handler);
+  void ReportError(const std::string& sentence);
+  void Fail(const std::string& sentence, int exit_status);
+  // Runs `call`; reports what it throws.
+  void CallSafely(const std::string& where, const std::function<void()>& call);
+
+  // --- for who drives it ---
+  // One round: handles messages that wait, runs what is due; when nothing waits any more, asks for what lacks and runs
+  // idle tasks. False if there is nothing left to do before something arrives or NextDueUs().
+  bool Step();
+  int64_t NextDueUs() const;
+  std::vector<std::shared_ptr<Bus>> buses() const;
+  void SendHeartbeats();
+  void SendStatus(bool is_final);
+  // Ends silently: neither hears nor says anything any more.
+  void Silence();
+  // The stage is about to be destroyed: none of its tasks and handlers is called again.
+  void ForgetStage();
+
   struct Timer {
     int64_t period_us = 0;
     int64_t due_us = 0;
     std::function<void()> task;
   };
 
-  Bus& BusOf(const Channel& channel);
-  std::shared_ptr<Bus> SharedBusOf(const Channel& channel);
-  std::string WireName(const Channel& channel) const { return prefix_ + channel.name; }
-  void Listen(const Channel& channel, std::unique_ptr<Inlet> inlet);
-  void ListenForRepairs();
-  void ListenForHeartbeats();
-  void OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header);
-  void OnRepair(const RepairRequest& request);
-  void SendHeartbeat();
-  void SendStatus();
-  void CallSafely(const std::string& where, const std::function<void()>& call);
-
-  // One round: handles what waits, runs what is due. Returns whether anything was done.
-  bool Step();
-  // When Step has something to do if nothing arrives.
-  int64_t NextDueUs() const;
-  bool CanListenAnywhere() const;
-
-  Setup setup_;
-  std::string prefix_;
-  int64_t epoch_us_ = 0;
-  size_t max_message_bytes_ = 0;
+  const Settings settings_;
+  const StageIdentity identity_;
+  const StreamSettings stream_settings_;
+  const std::shared_ptr<const Clock> clock_;
+  std::function<std::shared_ptr<Bus>(const std::string& url)> open_bus_;
+  std::function<void(bool is_error, const std::string& sentence)> log_;
   std::map<std::string, std::shared_ptr<Bus>> buses_;  // by URL
-  std::vector<std::unique_ptr<Outlet>> outlets_;
-  std::vector<std::unique_ptr<Inlet>> inlets_;
+  StageFigures figures_;
+  Neighbours neighbours_;
+  OutgoingStreams outgoing_;
+  IncomingStreams incoming_;
   std::vector<Timer> timers_;
   std::vector<std::function<bool()>> idle_tasks_;
-  int heartbeat_outlet_ = -1, repair_outlet_ = -1, status_outlet_ = -1;
-  bool hears_repairs_ = false, hears_heartbeats_ = false;
-  bool finished_ = false;
+  StageState state_ = StageState::kStarting;
   bool stopped_ = false;
+  bool stage_is_gone_ = false;
   int exit_status_ = 0;
   std::string failure_;
-  StageStatus status_;
-  std::vector<float> steps_ms_;
+
+ private:
+  void OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header);
+  void ListenToExtractors(const Heartbeat& heartbeat);
+  bool HandleMessages();
+  void RunTimers();
+  bool RunIdleTasks();
+
+  bool talks_ = false;  // the main bus has listeners
+  int heartbeat_stream_ = -1;
+  int repair_stream_ = -1;
+  int status_stream_ = -1;
+  bool hears_repairs_ = false;
+  int64_t heartbeat_due_us_ = 0;  // the next regular one
+  int64_t soon_due_us_ = INT64_MAX;  // the one soon after a value was sent
+  int64_t status_due_us_ = 0;
+  int64_t num_errors_ = 0;        // reported within the second that began at
+  int64_t errors_since_us_ = 0;
 };
 
 }  // namespace tessera

@@ -50,11 +50,11 @@ class StageProcess:
         """Exit status if it has just ended (negative: by that signal), else None."""
         if self._popen is None:
             return None
+        self._note_peak_memory()
         pid, status, usage = os.wait4(self._popen.pid, os.WNOHANG)
         if pid == 0:
             return None
         self.cpu_s += usage.ru_utime + usage.ru_stime
-        self.max_rss_mb = max(self.max_rss_mb, usage.ru_maxrss / 1024.0)
         self._popen.returncode = os.waitstatus_to_exitcode(status)
         ended, self._popen = self._popen, None
         return ended.returncode
@@ -65,8 +65,18 @@ class StageProcess:
     def kill(self) -> None:
         self._signal(signal.SIGKILL)
 
+    def _note_peak_memory(self) -> None:
+        """The kernel's high-water mark since exec. (ru_maxrss would begin with what this Python had when it forked.)"""
+        try:
+            status = Path(f"/proc/{self._popen.pid}/status").read_text()
+        except OSError:
+            return
+        if peak := re.search(r"^VmHWM:\s*(\d+) kB", status, re.MULTILINE):
+            self.max_rss_mb = max(self.max_rss_mb, 1024e-6 * int(peak[1]))
+
     def _signal(self, number: int) -> None:
         if self._popen is not None:
+            self._note_peak_memory()
             os.kill(self._popen.pid, number)
 
     def last_words(self) -> str:

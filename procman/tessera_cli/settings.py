@@ -51,7 +51,7 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
     assignments = source_assignments(arguments, source) + bus_assignments(source, arguments.port)
     assignments += [f"camera.pace={pace}", f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
     if arguments.record:
-        assignments += [f"recorder.path={out_dir / 'run.lcmlog'}", f"recorder.num_extractors={arguments.extractors}"]
+        assignments.append(f"recorder.path={out_dir / 'run.lcmlog'}")
     if arguments.features:
         assignments.append(f"features.num_features={arguments.features}")
     return assignments + user_assignments(arguments)

@@ -78,11 +78,11 @@ class Stack:
         self._is_source_ended = True
 
     def stop(self) -> None:
-        """Ends all by asking, and kills what does not listen. The recorder goes last, so that its log has the ends too."""
+        """Ends all by asking, and kills what does not listen. The recorder goes first: the others still send it what it lacks."""
         self._respawn_at.clear()
         recorder = [process for process in self.processes.values() if process.name == "recorder"]
-        _end([process for process in self.processes.values() if process not in recorder], self.warnings)
         _end(recorder, self.warnings)
+        _end([process for process in self.processes.values() if process not in recorder], self.warnings)
 
     def kill(self) -> None:
         for process in self.processes.values():

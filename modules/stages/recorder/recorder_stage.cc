@@ -1,21 +1,48 @@
 #include "stages/recorder/recorder_stage.h"
 
+#include <algorithm>
+#include <chrono>
+
 #include "core/errors.h"
 
 namespace tessera {
 namespace {
 
 std::string PathFrom(const Settings& settings) {
-  std::string path = settings.Get<std::string>("recorder.path");
+  const auto path = settings.Get<std::string>("recorder.path");
   if (path.empty()) {
-    throw InputError("recorder.path is empty: say where the log goes with --set recorder.path=FILE");
+    throw InputError("recorder.path is empty: name the log to write, --set recorder.path=FILE");
   }
   return path;
 }
 
 }  // namespace
 
-RecorderStage::RecorderStage(StageContext& context)
-    : recorder_(context, PathFrom(context.settings()), context.settings().Get<int>("recorder.num_extractors")) {}
+RecorderStage::RecorderStage(StageContext& context) : context_(context), log_(PathFrom(context.settings())) {
+  context.SubscribeAll([this](const std::string& channel, ByteView message, int64_t arrival_us) {
+    Write(channel, message, arrival_us);
+  });
+  context.Every(std::chrono::milliseconds(400), [this] {
+    context_.SetValue("events", static_cast<double>(log_.num_events()));
+    context_.SetValue("written_mb", 1e-6 * static_cast<double>(log_.num_bytes()));
+  });
+}
+
+RecorderStage::~RecorderStage() {
+  try {
+    log_.Close();
+  } catch (const InputError& error) {
+    context_.Fail(error.what(), 2);
+  }
+}
+
+void RecorderStage::Write(const std::string& channel, ByteView message, int64_t arrival_us) {
+  time_us_ = std::max(time_us_, arrival_us);
+  try {
+    log_.Write(time_us_, channel, message);
+  } catch (const InputError& error) {
+    context_.Fail(error.what(), 2);
+  }
+}
 
 }  // namespace tessera

@@ -1,0 +1,17 @@
+// The one list of what stages exchange: whoever adds a type adds it here, and its codec to codec.h.
+#pragma once
+
+// Expands X(Type) for every type that a stage may advertise and subscribe.
+#define TESSERA_FOR_EACH_VALUE_TYPE(X) \
+  X(CameraFrame)                       \
+  X(CameraCalibration)                 \
+  X(GroundTruthPose)                   \
+  X(EndOfStream)                       \
+  X(TileJob)                           \
+  X(TileFeatures)                      \
+  X(TileAck)                           \
+  X(FeatureFrame)                      \
+  X(PoseEstimate)                      \
+  X(KeyframeObservation)               \
+  X(ExtractorReady)                    \
+  X(StageStatus)

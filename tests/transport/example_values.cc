@@ -1,0 +1,309 @@
+#include "transport/example_values.h"
+
+#include <algorithm>
+
+namespace tessera {
+namespace {
+
+int Draw(std::mt19937& generator, int lowest, int highest) {
+  return std::uniform_int_distribution<int>(lowest, highest)(generator);
+}
+
+double DrawReal(std::mt19937& generator, double lowest, double highest) {
+  return std::uniform_real_distribution<double>(lowest, highest)(generator);
+}
+
+template <class Pixel>
+Image<Pixel> DrawImage(std::mt19937& generator, int width, int height) {
+  Image<Pixel> image(width, height);
+  for (Pixel& pixel : image.pixels) pixel = static_cast<Pixel>(generator());
+  return image;
+}
+
+Rigid3 DrawPose(std::mt19937& generator) {
+  Eigen::Quaterniond rotation(DrawReal(generator, -1, 1), DrawReal(generator, -1, 1), DrawReal(generator, -1, 1),
+                              DrawReal(generator, 0.1, 1));
+  return {rotation.normalized(),
+          {DrawReal(generator, -99, 99), DrawReal(generator, -99, 99), DrawReal(generator, -99, 99)}};
+}
+
+CameraCalibration DrawCalibration(std::mt19937& generator, int width, int height) {
+  CameraCalibration calibration{.sensor = static_cast<SensorType>(Draw(generator, 0, 2)),
+                                .width_px = width,
+                                .height_px = height,
+                                .fx_px = DrawReal(generator, 100, 900),
+                                .fy_px = DrawReal(generator, 100, 900),
+                                .cx_px = DrawReal(generator, 1, 900),
+                                .cy_px = DrawReal(generator, 1, 900)};
+  if (calibration.sensor == SensorType::kStereo) calibration.baseline_m = 0.5;
+  if (calibration.sensor == SensorType::kRgbd) calibration.depth_unit_m = 0.0002;
+  return calibration;
+}
+
+Descriptor DrawDescriptor(std::mt19937& generator) {
+  Descriptor descriptor;
+  for (uint64_t& word : descriptor) word = (static_cast<uint64_t>(generator()) << 32) | generator();
+  return descriptor;
+}
+
+bool AreSamePose(const Rigid3& a, const Rigid3& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
+}
+
+}  // namespace
+
+template <>
+CameraFrame DrawValue<CameraFrame>(std::mt19937& generator, int size) {
+  const int width = size == 0 ? 1 : Draw(generator, 300, 1300);
+  const int height = size == 0 ? 1 : Draw(generator, 50, 130);
+  CameraFrame frame{.id = {Draw(generator, 0, 9999)}, .utime_us = Draw(generator, 0, 1 << 30)};
+  frame.sensor = static_cast<SensorType>(Draw(generator, 0, 2));
+  frame.left = DrawImage<uint8_t>(generator, width, height);
+  if (frame.sensor == SensorType::kStereo) frame.right = DrawImage<uint8_t>(generator, width, height);
+  if (frame.sensor == SensorType::kRgbd) frame.depth = DrawImage<uint16_t>(generator, width, height);
+  return frame;
+}
+template <>
+bool AreSame(const CameraFrame& a, const CameraFrame& b) {
+  return a == b;
+}
+
+template <>
+CameraCalibration DrawValue<CameraCalibration>(std::mt19937& generator, int) {
+  return DrawCalibration(generator, Draw(generator, 1, 2000), Draw(generator, 1, 2000));
+}
+template <>
+bool AreSame(const CameraCalibration& a, const CameraCalibration& b) {
+  return a == b;
+}
+
+template <>
+GroundTruthPose DrawValue<GroundTruthPose>(std::mt19937& generator, int) {
+  return {.frame = {Draw(generator, 0, 9999)},
+          .utime_us = Draw(generator, 0, 1 << 30),
+          .world_from_camera = DrawPose(generator)};
+}
+template <>
+bool AreSame(const GroundTruthPose& a, const GroundTruthPose& b) {
+  return a.frame == b.frame && a.utime_us == b.utime_us && AreSamePose(a.world_from_camera, b.world_from_camera);
+}
+
+template <>
+EndOfStream DrawValue<EndOfStream>(std::mt19937& generator, int) {
+  return {.stage = "camera", .num_frames = Draw(generator, 10, 999), .num_dropped = Draw(generator, 0, 10)};
+}
+template <>
+bool AreSame(const EndOfStream& a, const EndOfStream& b) {
+  return a.stage == b.stage && a.num_frames == b.num_frames && a.num_dropped == b.num_dropped;
+}
+
+template <>
+TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
+  const int width = size == 0 ? 8 : Draw(generator, 300, 900);
+  const int height = size == 0 ? 8 : Draw(generator, 60, 200);
+  TileJob job;
+  job.frame = {Draw(generator, 1, 9999)};
+  job.previous_frame = {job.frame.value - 1};
+  job.utime_us = Draw(generator, 0, 1 << 30);
+  job.arrival_us = Draw(generator, 0, 1 << 30);
+  job.num_tiles = Draw(generator, 1, 17);
+  job.tile = job.num_tiles - 1;
+  job.calibration = DrawCalibration(generator, width, height);
+  job.first_level = 1;
+  job.last_level = 4;
+  job.left_rect = {2, 3, width - 4, height - 5};
+  job.core = {3, 4, width - 6, height - 7};
+  job.left = DrawImage<uint8_t>(generator, job.left_rect.width, job.left_rect.height);
+  if (job.calibration.sensor == SensorType::kStereo) {
+    job.right_rect = {0, 3, width - 1, height - 5};
+    job.right = DrawImage<uint8_t>(generator, job.right_rect.width, job.right_rect.height);
+  }
+  if (job.calibration.sensor == SensorType::kRgbd) {
+    job.depth_rect = job.core;
+    job.depth = DrawImage<uint16_t>(generator, job.depth_rect.width, job.depth_rect.height);
+  }
+  return job;
+}
+template <>
+bool AreSame(const TileJob& a, const TileJob& b) {
+  return a == b;
+}
+
+template <>
+TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
+  TileFeatures features;
+  features.frame = {Draw(generator, 1, 9999)};
+  features.previous_frame = {Draw(generator, -1, 0)};
+  features.utime_us = Draw(generator, 0, 1 << 30);
+  features.arrival_us = Draw(generator, 0, 1 << 30);
+  features.num_tiles = 3;
+  features.tile = Draw(generator, 0, 2);
+  features.calibration = DrawCalibration(generator, 640, 480);
+  const int num_candidates = size == 0 ? 0 : Draw(generator, 100, 3000);
+  for (int i = 0; i < num_candidates; ++i) {
+    features.candidates.push_back({.x = static_cast<int16_t>(Draw(generator, 0, 639)),
+                                   .y = static_cast<int16_t>(Draw(generator, 0, 479)),
+                                   .level = static_cast<uint8_t>(Draw(generator, 0, 7)),
+                                   .angle = static_cast<uint8_t>(generator()),
+                                   .score = static_cast<uint16_t>(generator()),
+                                   .right_x_px = static_cast<float>(DrawReal(generator, -1, 640)),
+                                   .depth_m = static_cast<float>(DrawReal(generator, 0, 9))});
+    features.descriptors.push_back(DrawDescriptor(generator));
+  }
+  return features;
+}
+template <>
+bool AreSame(const TileFeatures& a, const TileFeatures& b) {
+  return a == b;
+}
+
+template <>
+TileAck DrawValue<TileAck>(std::mt19937& generator, int size) {
+  TileAck ack{.frame = {Draw(generator, 0, 999)}, .tiles = {}};
+  for (int i = 0; i < 8 * size; ++i) ack.tiles.push_back(Draw(generator, 0, 99));
+  return ack;
+}
+template <>
+bool AreSame(const TileAck& a, const TileAck& b) {
+  return a.frame == b.frame && a.tiles == b.tiles;
+}
+
+template <>
+ExtractorReady DrawValue<ExtractorReady>(std::mt19937& generator, int) {
+  return {.extractor = Draw(generator, 0, 99), .epoch_us = 1'700'000'000'000'000, .num_jobs_done = Draw(generator, 0, 99)};
+}
+template <>
+bool AreSame(const ExtractorReady& a, const ExtractorReady& b) {
+  return a.extractor == b.extractor && a.epoch_us == b.epoch_us && a.num_jobs_done == b.num_jobs_done;
+}
+
+template <>
+FeatureFrame DrawValue<FeatureFrame>(std::mt19937& generator, int size) {
+  FeatureFrame frame;
+  frame.frame = {Draw(generator, 0, 9999)};
+  frame.utime_us = Draw(generator, 0, 1 << 30);
+  frame.arrival_us = Draw(generator, 0, 1 << 30);
+  frame.calibration = DrawCalibration(generator, 1241, 376);
+  const int num_keypoints = size == 0 ? 0 : Draw(generator, 100, 3000);
+  for (int i = 0; i < num_keypoints; ++i) {
+    frame.keypoints.push_back({.x_px = static_cast<float>(DrawReal(generator, 0, 1240)),
+                               .y_px = static_cast<float>(DrawReal(generator, 0, 375)),
+                               .right_x_px = static_cast<float>(DrawReal(generator, -1, 1240)),
+                               .depth_m = static_cast<float>(DrawReal(generator, 0, 9)),
+                               .score = static_cast<uint16_t>(generator()),
+                               .level = static_cast<uint8_t>(Draw(generator, 0, 7)),
+                               .angle = static_cast<uint8_t>(generator())});
+    frame.descriptors.push_back(DrawDescriptor(generator));
+  }
+  return frame;
+}
+template <>
+bool AreSame(const FeatureFrame& a, const FeatureFrame& b) {
+  return a.frame == b.frame && a.utime_us == b.utime_us && a.arrival_us == b.arrival_us &&
+         a.calibration == b.calibration && a.keypoints == b.keypoints && a.descriptors == b.descriptors;
+}
+
+template <>
+KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int size) {
+  KeyframeObservation keyframe{.id = {Draw(generator, 0, 99)},
+                               .features = DrawValue<FeatureFrame>(generator, size),
+                               .world_from_camera = DrawPose(generator)};
+  for (size_t i = 0; i < keyframe.features.keypoints.size(); ++i) {
+    keyframe.landmarks.push_back({Draw(generator, -1, 9999)});
+  }
+  return keyframe;
+}
+template <>
+bool AreSame(const KeyframeObservation& a, const KeyframeObservation& b) {
+  return a.id == b.id && AreSame(a.features, b.features) && AreSamePose(a.world_from_camera, b.world_from_camera) &&
+         a.landmarks == b.landmarks;
+}
+
+template <>
+PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
+  return {.frame = {Draw(generator, 0, 9999)},
+          .utime_us = Draw(generator, 0, 1 << 30),
+          .arrival_us = Draw(generator, 0, 1 << 30),
+          .state = static_cast<TrackingState>(Draw(generator, 0, 2)),
+          .world_from_camera = DrawPose(generator),
+          .reference_keyframe = {Draw(generator, -1, 99)},
+          .reference_from_camera = DrawPose(generator),
+          .num_features = Draw(generator, 0, 2000),
+          .num_matches = Draw(generator, 0, 2000),
+          .num_inliers = Draw(generator, 0, 2000),
+          .num_landmarks = Draw(generator, 0, 2000),
+          .is_keyframe = Draw(generator, 0, 1) == 1};
+}
+template <>
+bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
+  return a.frame == b.frame && a.utime_us == b.utime_us && a.arrival_us == b.arrival_us && a.state == b.state &&
+         AreSamePose(a.world_from_camera, b.world_from_camera) && a.reference_keyframe == b.reference_keyframe &&
+         AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_features == b.num_features &&
+         a.num_matches == b.num_matches && a.num_inliers == b.num_inliers && a.num_landmarks == b.num_landmarks &&
+         a.is_keyframe == b.is_keyframe;
+}
+
+template <>
+StageStatus DrawValue<StageStatus>(std::mt19937& generator, int size) {
+  StageStatus status{.name = "extractor_3", .host = "node", .pid = 77, .epoch_us = 1'700'000'000'000'000};
+  status.state = static_cast<StageState>(Draw(generator, 0, 3));
+  status.num_received = Draw(generator, 0, 999);
+  status.num_published = Draw(generator, 0, 999);
+  status.num_dropped = Draw(generator, 0, 999);
+  status.num_repaired = Draw(generator, 0, 999);
+  status.num_lost = Draw(generator, 0, 999);
+  status.num_undecodable = Draw(generator, 0, 999);
+  status.queue = Draw(generator, 0, 999);
+  status.step = {Draw(generator, 0, 999), DrawReal(generator, 0, 9), DrawReal(generator, 0, 9),
+                 DrawReal(generator, 0, 9), DrawReal(generator, 0, 9), DrawReal(generator, 0, 9)};
+  status.cpu_percent = DrawReal(generator, 0, 100);
+  status.cpu_s = DrawReal(generator, 0, 100);
+  status.rss_mb = DrawReal(generator, 0, 100);
+  status.last_error = size == 0 ? "" : "a sentence";
+  for (int i = 0; i < 5 * size; ++i) status.values.emplace_back("value_" + std::to_string(i), DrawReal(generator, -9, 9));
+  return status;
+}
+template <>
+bool AreSame(const StageStatus& a, const StageStatus& b) {
+  const auto counts = [](const StageStatus& s) {
+    return std::vector<int64_t>{s.pid,        s.epoch_us,     static_cast<int64_t>(s.state), s.num_received,
+                                s.num_published, s.num_dropped, s.num_repaired, s.num_lost, s.num_undecodable,
+                                s.queue,      s.step.count};
+  };
+  const auto figures = [](const StageStatus& s) {
+    return std::vector<double>{s.step.mean_ms, s.step.median_ms, s.step.p95_ms, s.step.p99_ms,
+                               s.step.max_ms,  s.cpu_percent,    s.cpu_s,       s.rss_mb};
+  };
+  return a.name == b.name && a.host == b.host && a.last_error == b.last_error && a.values == b.values &&
+         counts(a) == counts(b) && figures(a) == figures(b);
+}
+
+template <>
+Heartbeat DrawValue<Heartbeat>(std::mt19937& generator, int size) {
+  Heartbeat heartbeat{.host = "node", .pid = Draw(generator, 1, 99999), .streams = {}};
+  for (int i = 0; i < 16 * size; ++i) {
+    const int first = Draw(generator, 0, 99);
+    heartbeat.streams.push_back({"TILE_" + std::to_string(i), first, first + Draw(generator, 0, 99), i % 2 == 0});
+  }
+  return heartbeat;
+}
+template <>
+bool AreSame(const Heartbeat& a, const Heartbeat& b) {
+  return a == b;
+}
+
+template <>
+RepairRequest DrawValue<RepairRequest>(std::mt19937& generator, int size) {
+  RepairRequest request{.channel = "CAMERA", .publisher = "camera", .epoch_us = 1'700'000'000'000'000, .ranges = {}};
+  for (int i = 0; i < 16 * size; ++i) {
+    const int first = Draw(generator, 0, 99);
+    request.ranges.push_back({first, first + Draw(generator, 0, 99)});
+  }
+  return request;
+}
+template <>
+bool AreSame(const RepairRequest& a, const RepairRequest& b) {
+  return a == b;
+}
+
+}  // namespace tessera

@@ -1,0 +1,42 @@
+// Values of every type that is sent, drawn by a seed, and whether two of them are the same.
+#pragma once
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "transport/codec.h"
+
+namespace tessera {
+
+// Draws a valid value. `size`: 0 is the smallest that makes sense, 1 fills several messages.
+template <class Value>
+Value DrawValue(std::mt19937& generator, int size);
+
+template <class Value>
+bool AreSame(const Value& a, const Value& b);
+
+// Calls visit.operator()<Value>() for each type.
+template <class Visit>
+void ForEachValueType(Visit visit) {
+  visit.template operator()<CameraFrame>();
+  visit.template operator()<CameraCalibration>();
+  visit.template operator()<GroundTruthPose>();
+  visit.template operator()<EndOfStream>();
+  visit.template operator()<TileJob>();
+  visit.template operator()<TileFeatures>();
+  visit.template operator()<TileAck>();
+  visit.template operator()<ExtractorReady>();
+  visit.template operator()<FeatureFrame>();
+  visit.template operator()<KeyframeObservation>();
+  visit.template operator()<PoseEstimate>();
+  visit.template operator()<StageStatus>();
+  visit.template operator()<Heartbeat>();
+  visit.template operator()<RepairRequest>();
+}
+
+inline MessageHeader ExampleHeader() {
+  return {.publisher = "tester_7", .epoch_us = 1'700'000'000'000'000, .sequence = 12, .publish_us = 1'700'000'000'123'456};
+}
+
+}  // namespace tessera
