@@ -12,8 +12,8 @@ namespace tessera {
 
 class CornerDetector {
  public:
-  // Appends the corners of the plan's cells, cell by cell, best first, `capacity` per cell at most. The image must hold
-  // plan.left.
+  // Appends the corners of the plan's cells, cell by cell, best first, `capacity` per cell at most. The image,
+  // smoothed lightly so that noise makes no corners, must hold 4 px around plan.corners.
   //
   // score(p): the largest threshold t for which p is a corner, i.e. nine neighbouring pixels of the ring of 16 are all
   // brighter than p + t, or all darker than p - t.

@@ -10,6 +10,7 @@
 #include "features/feature_images.h"
 #include "features/pattern.h"
 #include "features/pyramid.h"
+#include "features/smoother.h"
 #include "features/tile_plan.h"
 
 namespace tessera {
@@ -62,16 +63,24 @@ int ScoreSlowly(const GrayImage& image, int x, int y) {
   return score;
 }
 
-int SmoothSlowly(const GrayImage& image, int x, int y) {
-  const auto smooth3 = [](auto value, int at, int step) {
-    const int sides = (value(at - step) + value(at + step) + 1) / 2;
-    return (sides + value(at) + 1) / 2;
-  };
-  const auto along_y = [&](int column) {
-    const auto pixel = [&](int row) -> int { return image.row(row)[column]; };
-    return smooth3([&](int row) { return smooth3(pixel, row, 1); }, y, 2);
-  };
-  return smooth3([&](int column) { return smooth3(along_y, column, 1); }, x, 2);
+// Averages of three pixels that are `step` apart, along y, then along x; every average of two is rounded up.
+GrayImage SmoothSlowly(const GrayImage& image, int step) {
+  const auto smooth3 = [](int before, int centre, int after) { return ((before + after + 1) / 2 + centre + 1) / 2; };
+  GrayImage along_y(image.width, image.height);
+  for (int y = step; y < image.height - step; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      along_y.row(y)[x] =
+          static_cast<uint8_t>(smooth3(image.row(y - step)[x], image.row(y)[x], image.row(y + step)[x]));
+    }
+  }
+  GrayImage smoothed(image.width, image.height);
+  for (int y = step; y < image.height - step; ++y) {
+    const uint8_t* row = along_y.row(y);
+    for (int x = step; x < image.width - step; ++x) {
+      smoothed.row(y)[x] = static_cast<uint8_t>(smooth3(row[x - step], row[x], row[x + step]));
+    }
+  }
+  return smoothed;
 }
 
 TEST(Pyramid, LevelsAreAsDefined) {
@@ -137,13 +146,14 @@ TEST(Pyramid, PositionsFollowTheScale) {
 
 TEST(Smoother, AveragesAsDefined) {
   const GrayImage image = MakeNoise(117, 64, 4);
-  const LevelImage level = LevelZero(image);
-  Smoother smoother;
-  const Rect region{.x = 3, .y = 3, .width = 110, .height = 58};
-  LevelImage out;
-  smoother.Smooth(level, region, out);
-  for (int y = region.y; y < region.bottom(); ++y) {
-    for (int x = region.x; x < region.right(); ++x) ASSERT_EQ(*out.At(x, y), SmoothSlowly(image, x, y));
+  for (const int step : {1, 2, 3}) {
+    const GrayImage expected = SmoothSlowly(image, step);
+    const Rect region{.x = 3, .y = 3, .width = 110, .height = 58};
+    LevelImage out;
+    Smoother().Smooth(LevelZero(image), region, step, out);
+    for (int y = region.y; y < region.bottom(); ++y) {
+      for (int x = region.x; x < region.right(); ++x) ASSERT_EQ(*out.At(x, y), expected.row(y)[x]) << step;
+    }
   }
 }
 
