@@ -7,6 +7,7 @@
 
 #include "optimization/bundle_costs.h"
 #include "optimization/bundle_solver.h"
+#include "optimization/window_solver.h"
 
 namespace tessera {
 namespace {
@@ -144,6 +145,30 @@ std::string CheckGauge(const BundleProblem& problem) {
   return {};
 }
 
+// Solves in rounds, each with the observations that the one before found to agree.
+template <class Solver>
+std::optional<BundleResult> AdjustInRounds(const BundleProblem& problem, const BundleOptions& options) {
+  Solver solver(problem, options);
+  BundleResult result;
+  std::vector<char> takes_part = InFront(problem);
+  for (int round = 0; round < options.num_rounds; ++round) {
+    const std::optional<BundleSummary> summary = solver.Solve(takes_part);
+    if (!summary) {
+      return std::nullopt;
+    }
+    result.initial_cost = round == 0 ? summary->initial_cost : result.initial_cost;
+    result.final_cost = summary->final_cost;
+    result.num_iterations += summary->num_iterations;
+    solver.WriteBack(result);
+    result.is_inlier = Classify(problem, result);
+    if (result.is_inlier == takes_part) {
+      break;
+    }
+    takes_part = result.is_inlier;
+  }
+  return result;
+}
+
 }  // namespace
 
 std::string BundleProblem::Check() const {
@@ -177,29 +202,19 @@ std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const Bun
   if (!IsFinite(problem)) {
     return std::nullopt;
   }
-  BundleSolver solver(problem, options);
-  BundleResult result;
-  std::vector<char> takes_part = InFront(problem);
-  for (int round = 0; round < options.num_rounds; ++round) {
-    const std::optional<BundleSolver::Summary> summary = solver.Solve(takes_part);
-    if (!summary) {
-      return std::nullopt;
-    }
-    result.initial_cost = round == 0 ? summary->initial_cost : result.initial_cost;
-    result.final_cost = summary->final_cost;
-    result.num_iterations += summary->num_iterations;
-    solver.WriteBack(result);
-    result.is_inlier = Classify(problem, result);
-    if (result.is_inlier == takes_part) {
-      break;
-    }
-    takes_part = result.is_inlier;
+  const auto num_free = std::count_if(problem.poses.begin(), problem.poses.end(),
+                                      [](const BundlePose& pose) { return !pose.is_fixed; });
+  const bool is_window = num_free <= options.max_num_dense_poses && !options.is_always_ceres;
+  std::optional<BundleResult> result = is_window ? AdjustInRounds<WindowSolver>(problem, options)
+                                                 : AdjustInRounds<BundleSolver>(problem, options);
+  if (!result) {
+    return std::nullopt;
   }
   if (problem.scale_pose >= 0) {
-    RestoreScale(problem, result);
+    RestoreScale(problem, *result);
   }
-  result.num_inliers = static_cast<int>(std::count(result.is_inlier.begin(), result.is_inlier.end(), 1));
-  return IsFinite(result) ? std::optional(std::move(result)) : std::nullopt;
+  result->num_inliers = static_cast<int>(std::count(result->is_inlier.begin(), result->is_inlier.end(), 1));
+  return IsFinite(*result) ? result : std::nullopt;
 }
 
 }  // namespace tessera

@@ -102,26 +102,22 @@ bool ReprojectionCost<kRows, kPoseBlocks...>::Evaluate(double const* const* para
   return true;
 }
 
-template <int kBlock, int... kPoseBlocks>
-RelativePoseCost<kBlock, kPoseBlocks...>::RelativePoseCost(const RelativePoseConstraint& constraint,
-                                                           const MovingPose& from, const MovingPose& to)
+RelativePoseTerm::RelativePoseTerm(const RelativePoseConstraint& constraint)
     : from_from_to_(constraint.to_from_from.Inverse()),
-      square_root_information_(constraint.information.llt().matrixU()),
-      from_(from),
-      to_(to) {}
+      square_root_information_(constraint.information.llt().matrixU()) {}
 
-template <int kBlock, int... kPoseBlocks>
-bool RelativePoseCost<kBlock, kPoseBlocks...>::Evaluate(double const* const* /*parameters*/, double* residuals,
-                                                        double** jacobians) const {
-  const Rigid3 to_from_from = to_.CameraFromWorld() * from_.CameraFromWorld().Inverse();
+Vector6d RelativePoseTerm::Residual(const Rigid3& from, const Rigid3& to) const {
+  const Rigid3 error = to * from.Inverse() * from_from_to_;
+  Vector6d r;
+  r << error.translation, LogSO3(error.rotation);
+  return square_root_information_ * r;
+}
+
+RelativePoseTerm::Linear RelativePoseTerm::Linearize(const Rigid3& from, const Rigid3& to) const {
+  const Rigid3 to_from_from = to * from.Inverse();
   const Rigid3 error = to_from_from * from_from_to_;
   Vector6d r;
   r << error.translation, LogSO3(error.rotation);
-  Eigen::Map<Vector6d> residual(residuals);
-  residual = square_root_information_ * r;
-  if (jacobians == nullptr) {
-    return true;
-  }
   // A left perturbation (v', w') of `error`: r_v' = Exp(w') r_v + v',  Exp(r_w') = Exp(w') Exp(r_w).
   Matrix6d by_error = Matrix6d::Identity();
   by_error.topRightCorner<3, 3>() = -Skew(error.translation);
@@ -133,8 +129,21 @@ bool RelativePoseCost<kBlock, kPoseBlocks...>::Evaluate(double const* const* /*p
   minus_adjoint.topLeftCorner<3, 3>() = -rotation;
   minus_adjoint.topRightCorner<3, 3>() = -Skew(to_from_from.translation) * rotation;
   minus_adjoint.bottomRightCorner<3, 3>() = -rotation;
-  WriteBlocks<kBlock, 6>(by_error * minus_adjoint * PerturbationByTangent(from_), jacobians);
-  WriteBlocks<kBlock, 6>(by_error * PerturbationByTangent(to_), jacobians + 6 / kBlock);
+  return {square_root_information_ * r, by_error * minus_adjoint, by_error};
+}
+
+template <int kBlock, int... kPoseBlocks>
+bool RelativePoseCost<kBlock, kPoseBlocks...>::Evaluate(double const* const* /*parameters*/, double* residuals,
+                                                        double** jacobians) const {
+  Eigen::Map<Vector6d> residual(residuals);
+  if (jacobians == nullptr) {
+    residual = term_.Residual(from_.CameraFromWorld(), to_.CameraFromWorld());
+    return true;
+  }
+  const RelativePoseTerm::Linear linear = term_.Linearize(from_.CameraFromWorld(), to_.CameraFromWorld());
+  residual = linear.residual;
+  WriteBlocks<kBlock, 6>(linear.by_from * PerturbationByTangent(from_), jacobians);
+  WriteBlocks<kBlock, 6>(linear.by_to * PerturbationByTangent(to_), jacobians + 6 / kBlock);
   return true;
 }
 

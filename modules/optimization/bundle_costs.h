@@ -71,17 +71,37 @@ using MonoReprojectionCost = ReprojectionCost<2, 6>;
 // The third row is zero for an observation without a right column, so that a mixed problem keeps one block size.
 using StereoReprojectionCost = ReprojectionCost<3, 3, 3>;
 
-// L' r with information = L L' and to * from^-1 = Retract(to_from_from, r); parameters: the tangents of `from` and `to`,
-// each in blocks of kBlock.
-template <int kBlock, int... kPoseBlocks>
-class RelativePoseCost final : public ceres::SizedCostFunction<6, kBlock, kPoseBlocks...> {
+// The residual of a constraint and its derivatives by left perturbations (Retract's tangents) of the two poses:
+//
+//   L' r  with  information = L L'  and  to * from^-1 = Retract(to_from_from, r)
+class RelativePoseTerm {
  public:
-  RelativePoseCost(const RelativePoseConstraint& constraint, const MovingPose& from, const MovingPose& to);
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+  struct Linear {
+    Eigen::Matrix<double, 6, 1> residual;
+    Eigen::Matrix<double, 6, 6> by_from;
+    Eigen::Matrix<double, 6, 6> by_to;
+  };
+
+  explicit RelativePoseTerm(const RelativePoseConstraint& constraint);
+  // Both poses camera_from_world.
+  Eigen::Matrix<double, 6, 1> Residual(const Rigid3& from, const Rigid3& to) const;
+  Linear Linearize(const Rigid3& from, const Rigid3& to) const;
 
  private:
   Rigid3 from_from_to_;
   Eigen::Matrix<double, 6, 6> square_root_information_;  // L'
+};
+
+// The same for Ceres; parameters: the tangents of `from` and `to`, each in blocks of kBlock.
+template <int kBlock, int... kPoseBlocks>
+class RelativePoseCost final : public ceres::SizedCostFunction<6, kBlock, kPoseBlocks...> {
+ public:
+  RelativePoseCost(const RelativePoseConstraint& constraint, const MovingPose& from, const MovingPose& to)
+      : term_(constraint), from_(from), to_(to) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  const RelativePoseTerm term_;
   const MovingPose& from_;
   const MovingPose& to_;
 };

@@ -141,7 +141,7 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleSolver::Ordering() {
   return ordering;
 }
 
-std::optional<BundleSolver::Summary> BundleSolver::Solve(const std::vector<char>& takes_part) {
+std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_part) {
   MarkUsed(takes_part);
   int num_free_poses = 0;
   for (size_t i = 0; i < poses_.size(); ++i) {
@@ -170,7 +170,7 @@ std::optional<BundleSolver::Summary> BundleSolver::Solve(const std::vector<char>
   if (!summary.IsSolutionUsable()) {
     return std::nullopt;
   }
-  return Summary{summary.initial_cost, summary.final_cost, static_cast<int>(summary.iterations.size()) - 1};
+  return BundleSummary{summary.initial_cost, summary.final_cost, static_cast<int>(summary.iterations.size()) - 1};
 }
 
 void BundleSolver::WriteBack(BundleResult& result) const {

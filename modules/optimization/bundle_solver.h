@@ -1,4 +1,4 @@
-// Builds the Ceres problem of a bundle, solves it, and writes the state back: the three pieces of AdjustBundle. Only this
+// Builds the Ceres problem of a bundle, solves it, and writes the state back. Only this
 // module's sources include this file.
 #pragma once
 
@@ -12,23 +12,18 @@
 
 #include "optimization/bundle_adjustment.h"
 #include "optimization/bundle_costs.h"
+#include "optimization/bundle_summary.h"
 
 namespace tessera {
 
 class BundleSolver {
  public:
-  struct Summary {
-    double initial_cost = 0.0;
-    double final_cost = 0.0;
-    int num_iterations = 0;
-  };
-
   // Both must outlive the solver; problem and options must be well formed, and the problem finite.
   BundleSolver(const BundleProblem& problem, const BundleOptions& options);
 
   // One robust least-squares solve over the constraints and the observations with takes_part[i] != 0, from where the last
   // one ended. nullopt: nothing free takes part, or Ceres failed; the state is then unspecified.
-  std::optional<Summary> Solve(const std::vector<char>& takes_part);
+  std::optional<BundleSummary> Solve(const std::vector<char>& takes_part);
 
   // The poses and points as they are now.
   void WriteBack(BundleResult& result) const;

@@ -68,13 +68,45 @@ TEST(AdjustBundle, RecoversStructureAloneWhenAllPosesAreFixed) {
   ExpectRecovered(MakeSyntheticBundle({.num_fixed = 8}));
 }
 
-TEST(AdjustBundle, SparseSolverGivesTheSame) {
-  const SyntheticBundle bundle = MakeSyntheticBundle({.pixel_noise_px = 0.5});
-  BundleOptions sparse = Exhaustive();
-  sparse.max_num_dense_poses = 0;
-  const auto a = AdjustBundle(bundle.problem, Exhaustive()), b = AdjustBundle(bundle.problem, sparse);
-  ASSERT_TRUE(a && b);
-  EXPECT_LT(MaxPoseError(*a, b->camera_from_world), 1e-7);
+TEST(AdjustBundle, AllSolversGiveTheSame) {
+  for (const double share : {0.0, 0.5}) {
+    const SyntheticBundle bundle = MakeSyntheticBundle({.share_with_right = share, .pixel_noise_px = 0.5});
+    BundleOptions sparse = Exhaustive(), ceres = Exhaustive();
+    sparse.max_num_dense_poses = 0;
+    ceres.is_always_ceres = true;
+    const auto a = AdjustBundle(bundle.problem, Exhaustive()), b = AdjustBundle(bundle.problem, sparse);
+    const auto c = AdjustBundle(bundle.problem, ceres);
+    ASSERT_TRUE(a && b && c);
+    EXPECT_LT(MaxPoseError(*a, b->camera_from_world), 1e-7);
+    EXPECT_LT(MaxPoseError(*a, c->camera_from_world), 1e-7);
+    EXPECT_EQ(a->is_inlier, b->is_inlier);
+  }
+}
+
+// Not only the same minimum: the same way there, outliers, constraints and damping included.
+TEST(AdjustBundle, WindowSolverTakesTheStepsOfCeres) {
+  for (const double share : {0.0, 0.5}) {
+    SyntheticBundle bundle = MakeSyntheticBundle({.share_with_right = share, .pixel_noise_px = 1.0, .pose_error = 0.2});
+    for (size_t i = 0; i < bundle.problem.observations.size(); i += 13) {
+      bundle.problem.observations[i].seen.pixel_px += Eigen::Vector2d(30.0, -20.0);
+    }
+    for (int i = 2; i < 7; ++i) {
+      const auto from = static_cast<size_t>(i);
+      const Rigid3 motion = bundle.camera_from_world[from + 1] * bundle.camera_from_world[from].Inverse();
+      bundle.problem.constraints.push_back({i, i + 1, motion, 1e3 * Eigen::Matrix<double, 6, 6>::Identity()});
+    }
+    for (int iterations = 1; iterations <= 4; ++iterations) {
+      BundleOptions own, ceres;
+      own.max_num_iterations = ceres.max_num_iterations = iterations;
+      own.num_rounds = ceres.num_rounds = 1;
+      ceres.is_always_ceres = true;
+      const auto a = AdjustBundle(bundle.problem, own), b = AdjustBundle(bundle.problem, ceres);
+      ASSERT_TRUE(a && b);
+      EXPECT_NEAR(a->initial_cost / b->initial_cost, 1.0, 1e-12);
+      EXPECT_NEAR(a->final_cost / b->final_cost, 1.0, 1e-4) << iterations;
+      EXPECT_LT(MaxPoseError(*a, b->camera_from_world), 1e-3) << iterations;
+    }
+  }
 }
 
 TEST(AdjustBundle, TwoViewsKeepTheFirstPoseAndTheDistanceToTheSecond) {

@@ -1,0 +1,123 @@
+#include "benchmarks/offline_run.h"
+
+#include <algorithm>
+#include <ctime>
+#include <memory>
+#include <string>
+
+#include "core/errors.h"
+#include "features/extractor.h"
+#include "features/selection.h"
+#include "features/tiling.h"
+#include "geometry/alignment.h"
+
+namespace tessera {
+namespace {
+
+// CPU time, which a busy machine changes less than wall time.
+template <class Step>
+auto Measure(std::vector<double>& ms, Step step) {
+  const std::clock_t begin = std::clock();
+  auto result = step();
+  ms.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+  return result;
+}
+
+FeatureFrame ExtractFrame(const CameraFrame& frame, const CameraCalibration& calibration, const FeatureOptions& options,
+                          Extractor& extractor) {
+  std::vector<TileFeatures> tiles;
+  for (const TileJob& job : CutFrame(frame, calibration, 0, TileGrid{1, 1}, kMaxLevels, options)) {
+    tiles.push_back(extractor.Extract(job));
+  }
+  return SelectFeatures(tiles);
+}
+
+void MirrorImage(GrayImage& image) {
+  for (int y = 0; y < image.height; ++y) std::reverse(image.row(y), image.row(y) + image.width);
+}
+
+// With S = diag(-1, 1, 1): a mirrored camera stands at S R S, S t.
+Rigid3 Mirrored(const Rigid3& pose) {
+  const Eigen::Quaterniond& q = pose.rotation;
+  const Eigen::Vector3d& t = pose.translation;
+  return {Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()), {-t.x(), t.y(), t.z()}};
+}
+
+}  // namespace
+
+FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptions& feature_options,
+                                bool is_mirrored) {
+  const auto source = OpenSource(options);
+  FeatureSequence sequence{source->calibration(), {}, source->ground_truth(), {}};
+  if (is_mirrored) {
+    if (options.sensor != SensorType::kMono) throw InputError("only mono sequences can be mirrored");
+    sequence.calibration.cx_px = sequence.calibration.width_px - 1 - sequence.calibration.cx_px;
+    for (GroundTruthPose& pose : sequence.ground_truth) pose.world_from_camera = Mirrored(pose.world_from_camera);
+  }
+  Extractor extractor;
+  while (auto frame = source->Next()) {
+    if (is_mirrored) MirrorImage(frame->left);
+    sequence.frames.push_back(Measure(sequence.extract_ms, [&] {
+      return ExtractFrame(*frame, sequence.calibration, feature_options, extractor);
+    }));
+  }
+  return sequence;
+}
+
+std::map<FrameId, Rigid3> OfflineRun::Live() const {
+  std::map<FrameId, Rigid3> live;
+  for (const PoseEstimate& pose : poses) {
+    if (pose.state == TrackingState::kTracked) live[pose.frame] = pose.world_from_camera;
+  }
+  return live;
+}
+
+std::map<FrameId, Rigid3> OfflineRun::Optimized() const {
+  std::map<FrameId, Rigid3> optimized;
+  for (const PoseEstimate& pose : poses) {
+    if (pose.state != TrackingState::kTracked) continue;
+    const auto reference = mapper.removed_keyframes().Find(mapper.map(), pose.reference_keyframe);
+    if (reference) optimized[pose.frame] = *reference * pose.reference_from_camera;
+  }
+  return optimized;
+}
+
+void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& tracker_options, int64_t map_delay_frames,
+          OfflineRun& run) {
+  MapTracker tracker(tracker_options);
+  DeltaSchedule schedule(map_delay_frames);
+  bool was_lost = false;
+  for (const FeatureFrame& features : frames) {
+    const MapTrackingResult result = Measure(run.track_ms, [&] {
+      for (const auto& delta : schedule.Take(features.frame)) {
+        if (const std::string problem = tracker.ApplyDelta(*delta); !problem.empty()) throw InputError(problem);
+      }
+      return tracker.Track(features);
+    });
+    run.poses.push_back(result.pose);
+    const bool is_lost = result.pose.state == TrackingState::kLost;
+    run.num_lost += is_lost ? 1 : 0;
+    run.num_failures += is_lost && !was_lost ? 1 : 0;
+    was_lost = is_lost;
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      schedule.KeyframeSent(keyframe.id, features.frame);
+      schedule.Receive(
+          std::make_shared<const MapDelta>(Measure(run.map_ms, [&] { return run.mapper.Process(keyframe); })));
+    }
+  }
+}
+
+std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,
+                               bool with_scale) {
+  std::vector<Eigen::Vector3d> a, b;
+  for (const GroundTruthPose& pose : truth) {
+    const auto found = estimate.find(pose.frame);
+    if (found == estimate.end()) continue;
+    a.push_back(found->second.translation);
+    b.push_back(pose.world_from_camera.translation);
+  }
+  const std::optional<Alignment> alignment = AlignPoints(a, b, with_scale);
+  return alignment ? std::optional(alignment->rms) : std::nullopt;
+}
+
+}  // namespace tessera

@@ -1,0 +1,51 @@
+// Tracking and mapping of a recorded sequence in one thread without the bus, with the deltas taken in logical time.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "datasets/frame_source.h"
+#include "evaluation/pose_text.h"
+#include "features/feature_types.h"
+#include "stages/mapper/mapper.h"
+#include "tracking/delta_schedule.h"
+#include "tracking/map_tracker.h"
+
+namespace tessera {
+
+// The features of a sequence, and what is known of the truth.
+struct FeatureSequence {
+  CameraCalibration calibration;
+  std::vector<FeatureFrame> frames;
+  std::vector<GroundTruthPose> ground_truth;
+  std::vector<double> extract_ms;  // CPU time by frame
+};
+
+// Reads and extracts. `is_mirrored` (mono only) swaps left and right in images and truth: a sequence of its own, equally
+// hard. Throws InputError as OpenSource does.
+FeatureSequence ExtractSequence(const SourceOptions& source, const FeatureOptions& options, bool is_mirrored);
+
+struct OfflineRun {
+  explicit OfflineRun(const MapperOptions& options) : mapper(options) {}
+
+  Mapper mapper;
+  std::vector<PoseEstimate> poses;
+  int num_lost = 0;
+  int num_failures = 0;  // changes from tracked to lost
+  std::vector<double> track_ms, map_ms;  // CPU time by frame, by keyframe
+
+  // Places of tracked frames: as known at the time, and after all optimisation.
+  std::map<FrameId, Rigid3> Live() const;
+  std::map<FrameId, Rigid3> Optimized() const;
+};
+
+// Tracks and maps the frames; `run` must be new.
+void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& tracker_options, int64_t map_delay_frames,
+          OfflineRun& run);
+
+// RMS distance [m] of the positions from the true ones after the best alignment; nullopt if too few are known.
+std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,
+                               bool with_scale);
+
+}  // namespace tessera

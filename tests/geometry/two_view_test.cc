@@ -1,0 +1,95 @@
+#include "geometry/two_view.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "geometry/synthetic_views.h"
+
+namespace tessera {
+namespace {
+
+const Rigid3 kSideways{ExpSO3({0.01, -0.05, 0.02}), {-1.2, 0.1, 0.1}};
+const Rigid3 kForward{ExpSO3({0.0, 0.02, 0.0}), {0.1, 0.0, -1.5}};
+
+double RotationError(const Rigid3& a, const Rigid3& b) { return a.rotation.angularDistance(b.rotation); }
+double DirectionError(const Rigid3& a, const Rigid3& b) {
+  return std::acos(std::min(1.0, a.translation.normalized().dot(b.translation.normalized())));
+}
+
+std::optional<TwoViewResult> Estimate(Scene scene, const Rigid3& motion, double noise_px, size_t outlier_step) {
+  const auto points = MakePoints(scene, motion, 300);
+  return EstimateTwoView(MakeCamera(), MakePairs(points, motion, noise_px, outlier_step), 5, {});
+}
+
+// Points up to the scale that two views leave open.
+void ExpectPoints(Scene scene, const Rigid3& motion, const TwoViewResult& result, double tolerance) {
+  const auto points = MakePoints(scene, motion, 300);
+  const double scale = motion.translation.norm();
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (result.points[i]) {
+      EXPECT_LT((scale * *result.points[i] - points[i]).norm(), tolerance * points[i].norm()) << i;
+    }
+  }
+}
+
+TEST(EstimateTwoView, RecoversMotionAndPointsWithoutNoise) {
+  for (const Scene scene : {Scene::kGeneral, Scene::kPlane}) {
+    for (const Rigid3& motion : {kSideways, kForward}) {
+      const auto result = Estimate(scene, motion, 0.0, 0);
+      if (scene == Scene::kPlane && !result) continue;  // a plane may allow two motions: refused, see below
+      ASSERT_TRUE(result.has_value());
+      EXPECT_NEAR(result->second_from_first.translation.norm(), 1.0, 1e-9);
+      EXPECT_LT(RotationError(result->second_from_first, motion), 1e-6);
+      EXPECT_LT(DirectionError(result->second_from_first, motion), 1e-6);
+      EXPECT_GE(result->num_points, 100);
+      ExpectPoints(scene, motion, *result, 1e-5);
+    }
+  }
+}
+
+TEST(EstimateTwoView, StandsNoiseAndWrongMatchesOnAGeneralScene) {
+  for (const Rigid3& motion : {kSideways, kForward}) {
+    const auto result = Estimate(Scene::kGeneral, motion, 0.5, 5);
+    ASSERT_TRUE(result.has_value());
+    EXPECT_LT(RotationError(result->second_from_first, motion), 0.003);
+    EXPECT_LT(DirectionError(result->second_from_first, motion), 0.03);
+  }
+}
+
+// A plane has a second motion that explains it as well (Faugeras & Lustman 1988), unless some of its points would stand
+// behind a camera. The start is then refused or right, never wrong.
+TEST(EstimateTwoView, IsRightOrRefusesOnAPlane) {
+  for (const double noise_px : {0.0, 0.5}) {
+    for (const Rigid3& motion : {kSideways, kForward}) {
+      const auto result = Estimate(Scene::kPlane, motion, noise_px, 5);
+      if (!result) continue;
+      EXPECT_LT(RotationError(result->second_from_first, motion), 0.01);
+      EXPECT_LT(DirectionError(result->second_from_first, motion), 0.1);
+    }
+  }
+}
+
+TEST(EstimateTwoView, RefusesARotationOnTheSpot) {
+  const Rigid3 turn{ExpSO3({0.0, 0.06, 0.0}), {0.0, 0.0, 0.0}};
+  for (const Scene scene : {Scene::kGeneral, Scene::kPlane}) {
+    EXPECT_FALSE(Estimate(scene, turn, 0.5, 0).has_value());
+  }
+}
+
+TEST(EstimateTwoView, RefusesTooLittleParallaxAndTooFewPairs) {
+  const Rigid3 small{kSideways.rotation, 0.01 * kSideways.translation};
+  EXPECT_FALSE(Estimate(Scene::kGeneral, small, 0.5, 0).has_value());
+  const auto points = MakePoints(Scene::kGeneral, kSideways, 20);
+  EXPECT_FALSE(EstimateTwoView(MakeCamera(), MakePairs(points, kSideways, 0.0, 0), 5, {}).has_value());
+}
+
+TEST(EstimateTwoView, SameSeedGivesTheSameBits) {
+  const auto first = Estimate(Scene::kGeneral, kForward, 0.5, 5), second = Estimate(Scene::kGeneral, kForward, 0.5, 5);
+  ASSERT_TRUE(first.has_value() && second.has_value());
+  EXPECT_EQ(first->second_from_first.translation, second->second_from_first.translation);
+  EXPECT_EQ(first->second_from_first.rotation.coeffs(), second->second_from_first.rotation.coeffs());
+}
+
+}  // namespace
+}  // namespace tessera
