@@ -183,7 +183,7 @@ TEST(Codec, HeadersOutOfRangeAreRefused) {
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.publisher = std::string(64, 'a'); }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.epoch_us = 0; }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.sequence = -1; }));
-  EXPECT_TRUE(is_refused([](MessageHeader& header) { header.sequence = INT64_MAX; }));
+  EXPECT_TRUE(is_refused([](MessageHeader& header) { header.sequence = int64_t{1} << 60; }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.publish_us = INT64_MIN; }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.num_parts = 0; }));
 }
