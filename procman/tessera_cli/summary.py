@@ -11,7 +11,7 @@ from tessera_cli.trajectories import TrajectoryError, absolute_error, read_traje
 
 # What the evaluator's run.json hands over as it is.
 EVALUATOR_KEYS = ("frames", "frames_tracked", "frames_lost", "frames_initializing", "frames_dropped", "tracking_failures",
-                  "keyframes", "landmarks", "pose_time_ms", "latency_ms", "stage_ms", "messages_repaired", "messages_lost",
+                  "keyframes", "landmarks", "pose_time_ms", "latency_ms", "map_wait_ms", "stage_ms", "messages_repaired", "messages_lost",
                   "trajectory_sha256", "map_sha256")
 
 
