@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 
 #include "map/map_exchange.h"
 #include "tessera/map_delta_t.hpp"
@@ -132,6 +133,12 @@ bool IsWhole(const MapDelta::NewKeyframe& keyframe, int32_t num_total) {
   return keyframe.features->keypoints.size() == static_cast<size_t>(num_total);
 }
 
+// The first `num` items. Generated decoders leave what an array held before when its new length is 0.
+template <class Item>
+std::span<const Item> First(const std::vector<Item>& items, int32_t num) {
+  return std::span(items).first(static_cast<size_t>(num));
+}
+
 // Appends what came to the delta's lists.
 class ChangeJoiner {
  public:
@@ -139,15 +146,19 @@ class ChangeJoiner {
 
   std::string Join(bool is_last) {
     return FirstProblem({JoinKeyframes(is_last), JoinMoved(), JoinLandmarks(),
-                         JoinObservations(change_.removed_observations, &delta_.removed_observations),
-                         JoinObservations(change_.new_observations, &delta_.new_observations), JoinParents(),
+                         JoinObservations(First(change_.removed_observations, change_.num_removed_observations),
+                                          &delta_.removed_observations),
+                         JoinObservations(First(change_.new_observations, change_.num_new_observations),
+                                          &delta_.new_observations),
+                         JoinParents(),
                          JoinRemoved(), Require(NumItems() <= kMaxItems, "it changes more than any mapper would")});
   }
 
  private:
   // A keyframe that a message leaves unfinished goes on in the next one, first of all.
   std::string JoinKeyframes(bool is_last) {
-    for (const map_keyframe_t& message : change_.new_keyframes) {
+    const auto messages = First(change_.new_keyframes, change_.num_new_keyframes);
+    for (const map_keyframe_t& message : messages) {
       const bool begins = message.keypoints.first == 0;
       if (begins) {
         if (delta_.new_keyframes.size() >= kMaxNewKeyframes) return "it brings more keyframes than any mapper would";
@@ -164,14 +175,14 @@ class ChangeJoiner {
            FromMessage(message.world_from_camera, &added.world_from_camera),
            JoinKeypoints(message.keypoints, begins, features.get())});
       if (!problem.empty()) return problem;
-      const bool may_go_on = !is_last && &message == &change_.new_keyframes.back();
+      const bool may_go_on = !is_last && &message == &messages.back();
       if (!may_go_on && !IsWhole(added, message.keypoints.num_total)) return "a keyframe lacks keypoints";
     }
     return "";
   }
 
   std::string JoinMoved() {
-    for (size_t i = 0; i < change_.moved_keyframes.size(); ++i) {
+    for (size_t i = 0; i < static_cast<size_t>(change_.num_moved_keyframes); ++i) {
       MapDelta::MovedKeyframe& moved = delta_.moved_keyframes.emplace_back();
       moved.id.value = change_.moved_keyframes[i];
       if (std::string problem = FromMessage(change_.world_from_camera[i], &moved.world_from_camera); !problem.empty()) {
@@ -182,7 +193,7 @@ class ChangeJoiner {
   }
 
   std::string JoinLandmarks() {
-    for (const map_landmark_t& message : change_.landmarks) {
+    for (const map_landmark_t& message : First(change_.landmarks, change_.num_landmarks)) {
       auto& [id, landmark] = delta_.changed_landmarks.emplace_back();
       id.value = message.landmark;
       landmark.min_distance = message.min_distance;
@@ -197,7 +208,7 @@ class ChangeJoiner {
     return "";
   }
 
-  std::string JoinObservations(const std::vector<map_observation_t>& messages,
+  std::string JoinObservations(std::span<const map_observation_t> messages,
                                std::vector<MapDelta::ChangedObservation>* observations) {
     for (const map_observation_t& message : messages) {
       if (message.landmark < 0 || message.keyframe < 0 || message.keypoint < 0) return "an observation is out of range";
@@ -207,7 +218,7 @@ class ChangeJoiner {
   }
 
   std::string JoinParents() {
-    for (size_t i = 0; i < change_.children.size(); ++i) {
+    for (size_t i = 0; i < static_cast<size_t>(change_.num_changed_parents); ++i) {
       if (change_.children[i] < 0 || change_.parents[i] < -1) return "a parent's number is out of range";
       delta_.changed_parents.push_back({{change_.children[i]}, {change_.parents[i]}});
     }
@@ -215,8 +226,12 @@ class ChangeJoiner {
   }
 
   std::string JoinRemoved() {
-    for (const int64_t id : change_.removed_landmarks) delta_.removed_landmarks.push_back({id});
-    for (const int64_t id : change_.removed_keyframes) delta_.removed_keyframes.push_back({id});
+    for (const int64_t id : First(change_.removed_landmarks, change_.num_removed_landmarks)) {
+      delta_.removed_landmarks.push_back({id});
+    }
+    for (const int64_t id : First(change_.removed_keyframes, change_.num_removed_keyframes)) {
+      delta_.removed_keyframes.push_back({id});
+    }
     return "";
   }
 

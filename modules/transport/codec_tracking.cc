@@ -116,7 +116,8 @@ struct Codec<KeyframeObservation> {
   }
   static std::string JoinShared(const Message& message, KeyframeObservation* keyframe) {
     const auto num_total = static_cast<size_t>(message.keypoints.num_total);
-    for (const shared_keypoint_t& shared : message.shared) {
+    for (size_t i = 0; i < static_cast<size_t>(message.num_shared); ++i) {
+      const shared_keypoint_t& shared = message.shared[i];
       SharedKeypoint& joined = keyframe->shared.emplace_back(
           SharedKeypoint{shared.keypoint, {shared.other}, shared.other_keypoint, Eigen::Vector3d::Zero()});
       const bool is_in_range = shared.keypoint >= 0 && static_cast<size_t>(shared.keypoint) < num_total &&

@@ -171,7 +171,7 @@ TEST(MapFollower, AWrongHashIsFoundAndMendedByASnapshot) {
     follower.Receive(delta);
     const std::string problem = Update(follower, replica);
     EXPECT_EQ(problem.find("wrong hash") != std::string::npos, i == 20) << problem;
-    if (i == 20 || i == 21) EXPECT_TRUE(follower.needs_snapshot());
+    EXPECT_EQ(follower.needs_snapshot(), i >= 20 && i <= 22);
     if (i < 22) continue;
     while (follower.Request()) {
       owner.Answer(*follower.Request(), follower);

@@ -57,9 +57,9 @@ Settings SettingsOf(const Folder& folder, const std::string& tiles) {
 }
 
 // One run, with a camera that keeps a few frames ahead of the poses.
-class Run {
+class StackRun {
  public:
-  explicit Run(const std::string& tiles = "1x1", int num_extractors = 1)
+  explicit StackRun(const std::string& tiles = "1x1", int num_extractors = 1)
       : bus_(SettingsOf(folder_, tiles)), camera_(bus_.AddContext("camera")) {
     frames_ = camera_.Advertise<CameraFrame>(kCameraChannel);
     calibration_ = camera_.Advertise<CameraCalibration>(kCalibrationChannel);
@@ -121,7 +121,7 @@ class Run {
 // Figures of the run that no other may differ from.
 const nlohmann::json& Reference() {
   static const nlohmann::json reference = [] {
-    Run run;
+    StackRun run;
     run.Begin();
     EXPECT_TRUE(run.Finish());
     return run.Figures();
@@ -146,7 +146,7 @@ TEST(MappingPipeline, TracksAndMaps) {
 }
 
 TEST(MappingPipeline, PosesFollowTheCamera) {
-  Run run;
+  StackRun run;
   run.Begin();
   ASSERT_TRUE(run.Finish());
   std::istringstream rows(run.folder().Read("trajectory.txt"));
@@ -162,7 +162,7 @@ TEST(MappingPipeline, PosesFollowTheCamera) {
 
 TEST(MappingPipeline, HashesAreTheSameForEveryCutAndPool) {
   for (const auto& [tiles, num_extractors] : {std::pair("2x2", 2), std::pair("2x4", 3)}) {
-    Run run(tiles, num_extractors);
+    StackRun run(tiles, num_extractors);
     run.Begin();
     ASSERT_TRUE(run.Finish()) << tiles;
     ExpectSame(run.Figures());
@@ -171,7 +171,7 @@ TEST(MappingPipeline, HashesAreTheSameForEveryCutAndPool) {
 
 TEST(MappingPipeline, HashesAreTheSameUnderLoss) {
   for (unsigned seed = 0; seed < 3; ++seed) {
-    Run run("2x2", 2);
+    StackRun run("2x2", 2);
     std::mt19937 generator(seed);
     run.bus().LoseMessages([&](const std::string&) { return generator() % 10 == 0; });
     run.Begin();
@@ -182,7 +182,7 @@ TEST(MappingPipeline, HashesAreTheSameUnderLoss) {
 }
 
 TEST(MappingPipeline, HashesAreTheSameWhenExtractorsDie) {
-  Run run("2x4", 3);
+  StackRun run("2x4", 3);
   run.Begin();
   ASSERT_TRUE(run.Reach(5));
   run.bus().Kill("extractor_1");
@@ -194,7 +194,7 @@ TEST(MappingPipeline, HashesAreTheSameWhenExtractorsDie) {
 }
 
 TEST(MappingPipeline, AFrameSeesExactlyTheDeltasOfItsStep) {
-  Run run;
+  StackRun run;
   run.Begin();
   ASSERT_TRUE(run.Finish());
   const int64_t delay = 3;  // tracker.map_delay_frames
@@ -210,7 +210,7 @@ TEST(MappingPipeline, AFrameSeesExactlyTheDeltasOfItsStep) {
 
 TEST(MappingPipeline, WhoComesLateReachesTheMappersMap) {
   for (const size_t num_poses : {size_t{2}, size_t{15}, size_t{38}}) {
-    Run run;
+    StackRun run;
     std::mt19937 generator(1);
     run.bus().LoseMessages([&](const std::string& channel) { return channel.starts_with("MAP_") && generator() % 5 == 0; });
     run.Begin();
@@ -224,7 +224,7 @@ TEST(MappingPipeline, WhoComesLateReachesTheMappersMap) {
 }
 
 TEST(MappingPipeline, AWrongDeltaIsReportedAndASnapshotMendsIt) {
-  Run run;
+  StackRun run;
   StageContext& liar = run.bus().AddContext("liar");
   const auto deltas = liar.Advertise<MapDelta>(kMapDeltaChannel, Publishers::kMany);
   liar.Subscribe<MapDelta>(kMapDeltaChannel, [&](const MapDelta& delta, const MessageInfo& info) {
@@ -241,7 +241,7 @@ TEST(MappingPipeline, AWrongDeltaIsReportedAndASnapshotMendsIt) {
 }
 
 TEST(MappingPipeline, AKeyframeOutOfTurnEndsTheMapperWithASentence) {
-  Run run;
+  StackRun run;
   StageContext& other = run.bus().AddContext("other");
   const auto keyframes = other.Advertise<KeyframeObservation>(kKeyframeChannel, Publishers::kMany);
   run.Begin();

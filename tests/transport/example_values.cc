@@ -1,6 +1,8 @@
 #include "transport/example_values.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 namespace tessera {
 namespace {
@@ -251,7 +253,8 @@ MapDelta DrawContent(std::mt19937& generator, int size) {
     auto features = std::make_shared<FeatureFrame>(DrawValue<FeatureFrame>(generator, i % 2));
     delta.new_keyframes.push_back({{i}, {Draw(generator, -1, 9)}, DrawPose(generator), std::move(features)});
   }
-  for (int i = 0; i < Draw(generator, 0, 2000) * size; ++i) {
+  const int num_landmarks = size * Draw(generator, 1, 2000);
+  for (int i = 0; i < num_landmarks; ++i) {
     delta.changed_landmarks.push_back({{Draw(generator, 0, 9999)}, DrawLandmark(generator)});
     delta.new_observations.push_back({{Draw(generator, 0, 99)}, {{Draw(generator, 0, 99)}, Draw(generator, 0, 99)}});
   }
