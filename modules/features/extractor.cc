@@ -103,8 +103,10 @@ void Extractor::MatchCandidates(const FeatureOptions& options) {
     const std::optional<int> right_x = matcher_.Match(left_[level], right_[level], candidate.x, candidate.y,
                                                       LevelDisparity(options, candidate.level));
     if (!right_x) continue;
-    candidate.right_x_px =
-        LevelZeroPosition(static_cast<double>(*right_x) / StereoMatcher::kSubpixels, candidate.level);
+    // The disparity is that of the pixel; the corner beside it is seen as far beside in both images.
+    const double corner_x = static_cast<double>(*right_x) / StereoMatcher::kSubpixels +
+                            static_cast<double>(candidate.offset_x) / kCornerSubpixels;
+    candidate.right_x_px = LevelZeroPosition(corner_x, candidate.level);
   }
 }
 

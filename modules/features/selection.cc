@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <tuple>
 
 #include "features/pyramid.h"
@@ -95,8 +96,11 @@ void PutBestFirst(std::span<Entry> level, size_t count) {
 }
 
 Keypoint MakeKeypoint(const Candidate& candidate) {
-  return {.x_px = LevelZeroPosition(candidate.x, candidate.level),
-          .y_px = LevelZeroPosition(candidate.y, candidate.level),
+  const auto position = [&candidate](int16_t pixel, int8_t offset) {
+    return LevelZeroPosition(pixel + static_cast<double>(offset) / kCornerSubpixels, candidate.level);
+  };
+  return {.x_px = position(candidate.x, candidate.offset_x),
+          .y_px = position(candidate.y, candidate.offset_y),
           .right_x_px = candidate.right_x_px,
           .depth_m = candidate.depth_m,
           .score = candidate.score,
@@ -174,6 +178,9 @@ std::string CheckTileFeatures(const TileFeatures& features) {
     if (candidate.x < kBorderPx || candidate.y < kBorderPx || candidate.x >= width - kBorderPx ||
         candidate.y >= height - kBorderPx) {
       return name + "a candidate lies outside its level's image";
+    }
+    if (2 * std::abs(candidate.offset_x) > kCornerSubpixels || 2 * std::abs(candidate.offset_y) > kCornerSubpixels) {
+      return name + "a candidate's corner lies outside its pixel";
     }
     if (!std::isfinite(candidate.right_x_px) || candidate.right_x_px >= static_cast<float>(features.calibration.width_px) ||
         !std::isfinite(candidate.depth_m) || candidate.depth_m < 0.0F) {

@@ -182,7 +182,18 @@ std::vector<Candidate> DetectSlowly(const GrayImage& image, int min_score, int c
       for (int y = cell_y; y < std::min(cell_y + kCellPx, image.height - kBorderPx); ++y) {
         for (int x = cell_x; x < std::min(cell_x + kCellPx, image.width - kBorderPx); ++x) {
           if (scores.row(y)[x] < min_score || !is_maximum(x, y)) continue;
-          cell.push_back({.x = static_cast<int16_t>(x), .y = static_cast<int16_t>(y), .score = scores.row(y)[x]});
+          const auto offset = [&](int step_x, int step_y) {
+            const int before = std::max<int>(scores.row(y - step_y)[x - step_x], min_score - 1);
+            const int after = std::max<int>(scores.row(y + step_y)[x + step_x], min_score - 1);
+            const int curvature = 2 * scores.row(y)[x] - before - after;
+            if (curvature == 0) return int8_t{0};
+            return static_cast<int8_t>(std::lround(kCornerSubpixels * 0.5 * (after - before) / curvature));
+          };
+          cell.push_back({.x = static_cast<int16_t>(x),
+                          .y = static_cast<int16_t>(y),
+                          .offset_x = offset(1, 0),
+                          .offset_y = offset(0, 1),
+                          .score = scores.row(y)[x]});
         }
       }
       std::stable_sort(cell.begin(), cell.end(), [](const auto& a, const auto& b) { return a.score > b.score; });

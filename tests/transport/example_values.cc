@@ -145,6 +145,8 @@ TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   for (int i = 0; i < num_candidates; ++i) {
     features.candidates.push_back({.x = static_cast<int16_t>(Draw(generator, 0, 639)),
                                    .y = static_cast<int16_t>(Draw(generator, 0, 479)),
+                                   .offset_x = static_cast<int8_t>(Draw(generator, -32, 32)),
+                                   .offset_y = static_cast<int8_t>(Draw(generator, -32, 32)),
                                    .level = static_cast<uint8_t>(Draw(generator, 0, 7)),
                                    .angle = static_cast<uint8_t>(generator()),
                                    .score = static_cast<uint16_t>(generator()),
