@@ -153,7 +153,8 @@ void WindowSolver::LinearizeTerm(const Term& term, size_t point, Matrix63d& w) {
   Eigen::Matrix<double, 6, kRows> by_pose;  // transposed: row' * -[p]x = (p x row)'
   for (int i = 0; i < kRows; ++i) {
     const Eigen::Vector3d row = by_camera.row(i).transpose();
-    by_pose.col(i) << row, in_camera.cross(row);
+    by_pose.col(i).template head<3>() = row;
+    by_pose.col(i).template tail<3>() = in_camera.cross(row);
   }
   const auto pose = static_cast<size_t>(term.free_pose);
   const Eigen::Matrix<double, 6, kRows> weighted_by_pose = weight * by_pose;
