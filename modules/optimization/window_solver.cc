@@ -152,9 +152,9 @@ void WindowSolver::LinearizeTerm(const Term& term, size_t point, Matrix63d& w) {
   if (term.free_pose < 0) return;
   Eigen::Matrix<double, 6, kRows> by_pose;  // transposed: row' * -[p]x = (p x row)'
   for (int i = 0; i < kRows; ++i) {
-    const double x = by_camera(i, 0), y = by_camera(i, 1), z = by_camera(i, 2);
-    by_pose.col(i) << x, y, z, in_camera.y() * z - in_camera.z() * y, in_camera.z() * x - in_camera.x() * z,
-        in_camera.x() * y - in_camera.y() * x;
+    const Eigen::Vector3d row = by_camera.row(i).transpose();
+    by_pose.col(i).template head<3>() = row;
+    by_pose.col(i).template tail<3>() = in_camera.cross(row);
   }
   const auto pose = static_cast<size_t>(term.free_pose);
   const Eigen::Matrix<double, 6, kRows> weighted_by_pose = weight * by_pose;
