@@ -45,7 +45,7 @@ template <>
 struct Codec<KeyframeObservation> {
   using Message = keyframe_t;
   static constexpr const char* kTypeName = "keyframe_t";
-  static constexpr size_t kBytesPerLandmark = 8;
+  static constexpr size_t kBytesEach = kBytesPerKeypoint + 8;  // a keypoint and its landmark
   static constexpr size_t kBytesPerShared = 4 + 8 + 4 + 3 * 8;
 
   template <class Emit>
@@ -60,14 +60,14 @@ struct Codec<KeyframeObservation> {
     const size_t num_keypoints = keyframe.features.keypoints.size();
     size_t first = 0, first_shared = 0;
     do {
-      const size_t num = std::min(std::max<size_t>(1, room / (kBytesPerKeypoint + kBytesPerLandmark)), num_keypoints - first);
+      const size_t num = std::min(std::max<size_t>(1, room / kBytesEach), num_keypoints - first);
       FillKeypoints(keyframe.features, first, num, &message->keypoints);
       message->num_landmarks = static_cast<int32_t>(num);
       message->landmarks.resize(num);
       for (size_t i = 0; i < num; ++i) message->landmarks[i] = keyframe.landmarks[first + i].value;
       first += num;
       // What follows the last keypoints fills their message up.
-      const size_t left = first == num_keypoints ? room - std::min(room, num * (kBytesPerKeypoint + kBytesPerLandmark)) : 0;
+      const size_t left = first == num_keypoints ? room - std::min(room, num * kBytesEach) : 0;
       const size_t at_least = num == 0 ? 1 : 0;
       const size_t num_shared =
           std::min(std::max(at_least, left / kBytesPerShared), keyframe.shared.size() - first_shared);

@@ -29,7 +29,9 @@ StageFigures FiguresOf(const StageStatus& status) {
 }  // namespace
 
 EvaluatorStage::EvaluatorStage(StageContext& context)
-    : context_(context), out_dir_(context.settings().Get<std::string>("evaluator.out_dir")), map_(context, false, [this] { OnDeltas(); }) {
+    : context_(context),
+      out_dir_(context.settings().Get<std::string>("evaluator.out_dir")),
+      map_(context, false, [this] { OnDeltas(); }) {
   if (!out_dir_.empty()) {
     std::error_code error;
     std::filesystem::create_directories(out_dir_, error);
