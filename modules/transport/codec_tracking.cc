@@ -86,7 +86,7 @@ struct Codec<KeyframeObservation> {
       keyframe->num_deltas = message.num_deltas;
     }
     const std::string problem = FirstProblem(
-        {Require(message.keyframe >= 0 && message.keyframe == keyframe->id.value, "its keyframe number is out of range"),
+        {Require(message.keyframe >= 0 && message.keyframe == keyframe->id.value, "its number is out of range"),
          Require(message.reference >= -1 && message.reference < message.keyframe && message.num_deltas >= 0,
                  "its reference or its count of deltas is out of range"),
          FromMessage(message.world_from_camera, &keyframe->world_from_camera),

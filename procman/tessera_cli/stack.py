@@ -1,4 +1,4 @@
-"""All processes of one run. Extractors that die are started again; any other death ends the run."""
+"""All processes of one run. Extractors that die, and a mapper that is killed, are started again; any other death ends the run."""
 
 import time
 from pathlib import Path
@@ -51,16 +51,17 @@ class Stack:
         for name in [name for name, due in self._respawn_at.items() if now >= due]:
             del self._respawn_at[name]
             self.processes[name].start()
-            self.num_extractor_restarts += 1
+            self.num_extractor_restarts += name.startswith("extractor_")
 
     def _handle_death(self, process: StageProcess, status: int) -> None:
         if process.name == "camera" and self._is_source_ended:
             return
         if status == 2:
             raise UserError(f"{process.name}: {process.last_words()}")
-        if not process.name.startswith("extractor_"):
-            lost = ", and the map is gone with it" if process.name == "mapper" else ""
-            raise RunFailed(f"{process.name} {describe_exit(status)}{lost}; the last line of {process.log_path}: {process.last_words()}")
+        # A mapper that fails by its own decision would do so again; one that was killed builds the same map again.
+        can_go_on = process.name.startswith("extractor_") or (process.name == "mapper" and status < 0)
+        if not can_go_on:
+            raise RunFailed(f"{process.name} {describe_exit(status)}; the last line of {process.log_path}: {process.last_words()}")
         lived_s = time.monotonic() - process.started_at
         deaths = 1 if lived_s > STABLE_AFTER_S else self._deaths_in_a_row.get(process.name, 0) + 1
         self._deaths_in_a_row[process.name] = deaths

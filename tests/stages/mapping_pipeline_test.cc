@@ -98,7 +98,8 @@ class StackRun {
 
  private:
   void SendMore() {
-    for (; next_ < kNumFrames && next_ < static_cast<int64_t>(poses_.size()) + 6; ++next_) frames_.Publish(scene_.Frame(next_));
+    const int64_t end = std::min(kNumFrames, static_cast<int64_t>(poses_.size()) + 6);
+    for (; next_ < end; ++next_) frames_.Publish(scene_.Frame(next_));
     if (next_ == kNumFrames && !has_ended_) {
       has_ended_ = true;
       end_.Publish({.stage = "camera", .num_frames = kNumFrames});
@@ -130,7 +131,8 @@ const nlohmann::json& Reference() {
 }
 
 void ExpectSame(const nlohmann::json& figures) {
-  for (const char* key : {"frames", "frames_tracked", "frames_dropped", "keyframes", "landmarks", "trajectory_sha256", "map_sha256"}) {
+  for (const char* key : {"frames", "frames_tracked", "frames_dropped", "keyframes", "landmarks", "trajectory_sha256",
+                          "map_sha256"}) {
     EXPECT_EQ(figures[key], Reference()[key]) << key;
   }
 }
@@ -195,6 +197,20 @@ TEST(MappingPipeline, HashesAreTheSameWhenExtractorsDie) {
   ExpectSame(run.Figures());
 }
 
+TEST(MappingPipeline, AKilledMapperBuildsTheSameMapAgain) {
+  for (const size_t num_poses : {size_t{1}, size_t{18}, size_t{37}}) {
+    StackRun run;
+    std::mt19937 generator(2);
+    run.bus().LoseMessages([&](const std::string&) { return generator() % 20 == 0; });
+    run.Begin();
+    ASSERT_TRUE(run.Reach(num_poses));
+    run.bus().Kill("mapper");
+    run.bus().Start<MapperStage>("mapper");
+    ASSERT_TRUE(run.Finish()) << num_poses;
+    ExpectSame(run.Figures());
+  }
+}
+
 TEST(MappingPipeline, AFrameSeesExactlyTheDeltasOfItsStep) {
   StackRun run;
   run.Begin();
@@ -214,7 +230,8 @@ TEST(MappingPipeline, WhoComesLateReachesTheMappersMap) {
   for (const size_t num_poses : {size_t{2}, size_t{15}, size_t{38}}) {
     StackRun run;
     std::mt19937 generator(1);
-    run.bus().LoseMessages([&](const std::string& channel) { return channel.starts_with("MAP_") && generator() % 5 == 0; });
+    run.bus().LoseMessages(
+        [&](const std::string& channel) { return channel.starts_with("MAP_") && generator() % 5 == 0; });
     run.Begin();
     ASSERT_TRUE(run.Reach(num_poses));
     run.bus().Start<MapWriterStage>("map_writer");

@@ -46,10 +46,13 @@ MapperStage::MapperStage(StageContext& context) : context_(context), mapper_(Opt
 
 void MapperStage::OnKeyframe(const KeyframeObservation& keyframe) {
   // Each delta answers one keyframe, and the tracker waits for it: one that is missing can't be passed over.
-  const int64_t expected = mapper_.map().next_delta();
-  if (keyframe.id.value != expected) {
-    context_.Fail("keyframe " + std::to_string(keyframe.id.value) + " came where " + std::to_string(expected) +
-                  " was expected: one was lost beyond repair, or there are two trackers; start the stack again");
+  if (const int64_t expected = mapper_.map().next_delta(); keyframe.id.value != expected) {
+    const std::string name = "keyframe " + std::to_string(keyframe.id.value);
+    const std::string sentence =
+        expected == 0 ? "the tracker keeps no keyframes before " + name + " any more, so the map can't be built again"
+                      : name + " came where " + std::to_string(expected) +
+                            " was expected: one was lost beyond repair, or there are two trackers";
+    context_.Fail(sentence + "; start the stack again");
     return;
   }
   std::shared_ptr<const MapDelta> delta;
