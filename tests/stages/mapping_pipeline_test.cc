@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kNumFrames = 40;
+constexpr int64_t kNumFrames = 50;
 
 class Folder {
  public:
@@ -50,6 +50,7 @@ Settings SettingsOf(const Folder& folder, const std::string& tiles) {
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
+  settings.Override("tracker.keyframe_min_share=0.9");  // a short way, and yet many keyframes
   settings.Override("evaluator.out_dir=" + folder.path());
   settings.Override("map_writer.path=" + folder.File("late.ply"));
   settings.Override("map_writer.follow=true");
@@ -157,8 +158,8 @@ TEST(MappingPipeline, PosesFollowTheCamera) {
   double time = 0, x = 0, y = 0, z = 0, q[4];
   for (int64_t frame = 0; frame < kNumFrames; ++frame) {
     ASSERT_TRUE(rows >> time >> x >> y >> z >> q[0] >> q[1] >> q[2] >> q[3]) << frame;
-    // 1 % of the whole way; the walls are 5 and 10 m off.
-    const double max_error_m = 0.01 * MovingScene::kStepM * kNumFrames;
+    // 2 % of the whole way. Sideways motion along walls is hard to tell from a turn.
+    const double max_error_m = 0.02 * MovingScene::kStepM * kNumFrames;
     EXPECT_NEAR(x, MovingScene::kStepM * static_cast<double>(frame), max_error_m) << frame;
     EXPECT_NEAR(std::hypot(y, z), 0.0, max_error_m) << frame;
   }

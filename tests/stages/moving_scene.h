@@ -13,7 +13,8 @@ namespace tessera {
 class MovingScene {
  public:
   static constexpr int kWidth = 320, kHeight = 240;
-  static constexpr int kFarShift = 3, kNearShift = 6;  // px a frame; the disparities are twice as large
+  static constexpr int kFarShift = 2, kNearShift = 4;  // px a frame
+  static constexpr int kStepsPerBaseline = 4;          // so the disparities are 8 and 16 px, the walls 7.5 and 3.75 m off
 
   MovingScene() : far_(RectanglesImage(kTexture, kHeight / 2, 1)), near_(RectanglesImage(kTexture, kHeight / 2, 2)) {}
 
@@ -25,23 +26,23 @@ class MovingScene {
             .fy_px = 300,
             .cx_px = 160,
             .cy_px = 120,
-            .baseline_m = 0.2};
+            .baseline_m = kBaselineM};
   }
-  // The camera moves by half a baseline, 0.1 m, between two frames.
   CameraFrame Frame(int64_t id) const {
     CameraFrame frame;
     frame.id = {id};
     frame.utime_us = 100'000 * id;
     frame.sensor = SensorType::kStereo;
     frame.left = Picture(static_cast<int>(id));
-    frame.right = Picture(static_cast<int>(id) + 2);
+    frame.right = Picture(static_cast<int>(id) + kStepsPerBaseline);
     return frame;
   }
-  static constexpr double kStepM = 0.1;
+  static constexpr double kBaselineM = 0.2;
+  static constexpr double kStepM = kBaselineM / kStepsPerBaseline;  // sideways, between two frames
   static constexpr int kMaxFrames = 60;
 
  private:
-  static constexpr int kTexture = kWidth + kNearShift * (kMaxFrames + 2);
+  static constexpr int kTexture = kWidth + kNearShift * (kMaxFrames + kStepsPerBaseline);
 
   GrayImage Picture(int step) const {
     GrayImage image(kWidth, kHeight);
