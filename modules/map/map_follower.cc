@@ -19,7 +19,8 @@ void MapFollower::Receive(Delta delta) {
     lacks_start_ = false;
     collected_.reset();
   }
-  waiting_[delta->number] = std::move(delta);
+  const int64_t number = delta->number;
+  waiting_.try_emplace(number, std::move(delta));
 }
 
 void MapFollower::Receive(const MapSnapshotPage& page) {
