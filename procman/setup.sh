@@ -106,6 +106,8 @@ make_python_env() {
   case "$have" in
     "$place "*) ;;
     *)
+      # A link leads to the environment of another checkout, which --clear would empty.
+      [ ! -L "$root/.venv" ] || rm "$root/.venv"
       say "Making the Python environment .venv, which brings LCM 1.5.3"
       log_step "The Python environment could not be made." /usr/bin/python3 -m venv --clear "$root/.venv"
       ;;

@@ -4,6 +4,7 @@
 
 #include "core/errors.h"
 #include "datasets/recording.h"
+#include "datasets/simulated_source.h"
 #include "datasets/stream_source.h"
 
 namespace tessera {
@@ -24,17 +25,18 @@ std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   const std::string rest = source.size() > kind.size() ? source.substr(kind.size() + 1) : "";
   if (rest.empty()) {
     throw InputError("source `" + source +
-                     "` must be kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://... or log:FILE");
+                     "` must be kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME or log:FILE");
   }
   if (kind == "kitti") return PlayRecording(LoadKitti(rest, options), options);
   if (kind == "euroc") return PlayRecording(LoadEuroc(rest, options), options);
   if (kind == "tum") return PlayRecording(LoadTum(rest, options), options);
+  if (kind == "sim") return OpenSimulation(rest, options);
   if (kind == "video") return OpenVideoFile(rest, options);
   if (kind == "camera") return OpenDevice(rest, options);
   if (kind == "rtsp" || kind == "rtsps") return OpenNetworkStream(source, options);
   throw InputError("source `" + source +
                    "` is of an unknown kind: give kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, "
-                   "rtsp://... or log:FILE");
+                   "rtsp://..., sim:NAME or log:FILE");
 }
 
 }  // namespace tessera

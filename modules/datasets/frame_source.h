@@ -16,7 +16,7 @@
 namespace tessera {
 
 struct SourceOptions {
-  std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://...
+  std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME
   SensorType sensor = SensorType::kMono;  // mono takes the left images of a pair
   std::string calibration_path;  // YAML (calibration_file.h), instead of the source's own; empty: its own
   double depth_unit_m = 0.0;     // RGB-D: metres per count, instead of what the source says; 0: as it says

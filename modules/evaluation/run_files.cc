@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "evaluation/map_text.h"
 #include "evaluation/pose_text.h"
 
 namespace tessera {
@@ -97,14 +98,16 @@ void WriteFile(const std::string& path, const std::string& text) {
 
 std::string FramesCsv(const RunRecord& record) {
   std::string text =
-      "frame,utime_us,state,pose_time_ms,latency_ms,features,matches,inliers,landmarks,is_keyframe\n";
+      "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,"
+      "num_deltas\n";
   for (const FrameRecord& frame : record.Frames()) {
     const PoseEstimate& pose = frame.pose;
     char row[256];
-    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%d,%d,%d,%d,%d\n", pose.frame.value,
-                  pose.utime_us, StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
-                  MillisecondsText(frame.latency_ms).c_str(), pose.num_features, pose.num_matches,
-                  pose.num_inliers, pose.num_landmarks, pose.is_keyframe ? 1 : 0);
+    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%s,%d,%d,%d,%d,%d,%" PRId64 "\n",
+                  pose.frame.value, pose.utime_us, StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
+                  MillisecondsText(frame.latency_ms).c_str(), MillisecondsText(frame.map_wait_ms).c_str(),
+                  pose.num_features, pose.num_matches, pose.num_inliers, pose.num_landmarks, pose.is_keyframe ? 1 : 0,
+                  pose.num_deltas);
     text += row;
   }
   return text;
@@ -128,15 +131,16 @@ std::string RunJson(const RunRecord& record) {
                      {"frames_initializing", counts.initializing},
                      {"frames_dropped", counts.dropped},
                      {"tracking_failures", counts.tracking_failures},
-                     {"keyframes", record.num_keyframes()},
-                     {"landmarks", record.num_landmarks()},
+                     {"keyframes", record.map().keyframes().size()},
+                     {"landmarks", record.map().landmarks().size()},
                      {"pose_time_ms", ToJson(SummarizeFrames(frames, &FrameRecord::pose_time_ms))},
                      {"latency_ms", ToJson(SummarizeFrames(frames, &FrameRecord::latency_ms))},
+                     {"map_wait_ms", ToJson(SummarizeFrames(frames, &FrameRecord::map_wait_ms))},
                      {"stage_ms", stage_ms},
                      {"messages_repaired", num_repaired},
                      {"messages_lost", num_lost},
                      {"trajectory_sha256", record.TrajectorySha256()},
-                     {"map_sha256", record.MapSha256()}};
+                     {"map_sha256", record.map().Sha256Hex()}};
   return json.dump(2) + "\n";
 }
 
@@ -150,6 +154,7 @@ void WriteRun(const RunRecord& record, const std::string& folder) {
   WriteFile(folder + "/trajectory_live.txt", TumText(record.LiveTrajectory()));
   WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame()));
   WriteFile(folder + "/keyframes.txt", TumText(record.Keyframes()));
+  WriteFile(folder + "/map.ply", PlyText(record.map()));
   WriteFile(folder + "/ground_truth.txt", TumText(record.GroundTruth()));
   WriteFile(folder + "/frames.csv", FramesCsv(record));
   WriteFile(folder + "/run.json", RunJson(record));  // last: whoever sees it finds all the others

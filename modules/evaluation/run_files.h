@@ -11,14 +11,14 @@ namespace tessera {
 // Throws InputError if it can't be written.
 void WriteFile(const std::string& path, const std::string& text);
 
-// Columns: frame, utime_us, state, pose_time_ms, latency_ms, features, matches, inliers, landmarks,
-// is_keyframe. What is unknown is empty.
+// Columns: frame, utime_us, state, pose_time_ms, latency_ms, map_wait_ms, features, matches, inliers, landmarks,
+// is_keyframe, num_deltas. What is unknown is empty.
 std::string FramesCsv(const RunRecord& record);
 
 // The figures of the run (INTERFACE: `summary.json` is made of them), as JSON.
 std::string RunJson(const RunRecord& record);
 
-// Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, ground_truth.txt,
+// Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, map.ply, ground_truth.txt,
 // frames.csv and, at the very end, run.json into the folder, which is made if need be. Throws InputError if
 // one can't be written.
 void WriteRun(const RunRecord& record, const std::string& folder);

@@ -14,34 +14,15 @@ void AddPoseBits(const Rigid3& pose, Sha256& hash) {
   }
 }
 
-std::string HashKeyframe(const KeyframeObservation& keyframe) {
-  Sha256 hash;
-  hash.Add(keyframe.id.value);
-  hash.Add(keyframe.features.frame.value);
-  AddPoseBits(keyframe.world_from_camera, hash);
-  hash.Add(static_cast<int64_t>(keyframe.features.keypoints.size()));
-  for (const Keypoint& keypoint : keyframe.features.keypoints) {
-    hash.Add(static_cast<double>(keypoint.x_px));
-    hash.Add(static_cast<double>(keypoint.y_px));
-  }
-  for (const LandmarkId landmark : keyframe.landmarks) {
-    hash.Add(landmark.value);
-  }
-  return hash.HexDigest();
-}
-
 }  // namespace
 
 void RunRecord::AddPose(const PoseEstimate& pose, int64_t publish_us) {
   poses_.try_emplace(pose.frame, pose, publish_us);
 }
 
-void RunRecord::AddKeyframe(const KeyframeObservation& keyframe) {
-  // The features themselves are not kept: a long run has more of them than memory.
-  if (!keyframes_.contains(keyframe.id)) {
-    const StampedPose pose{keyframe.features.frame, keyframe.features.utime_us, keyframe.world_from_camera};
-    keyframes_[keyframe.id] = {pose, HashKeyframe(keyframe)};
-  }
+std::string RunRecord::ApplyDelta(const MapDelta& delta) {
+  removed_.Remember(map_, delta);
+  return map_.Apply(delta);
 }
 
 void RunRecord::AddGroundTruth(const GroundTruthPose& truth) {
@@ -58,7 +39,8 @@ void RunRecord::SetEnd(int64_t num_frames, int64_t num_dropped) {
 std::vector<FrameRecord> RunRecord::Frames() const {
   std::vector<FrameRecord> frames;
   for (const auto& [id, pose] : poses_) {
-    FrameRecord frame{pose.estimate, pose.publish_us, std::nullopt, std::nullopt};
+    FrameRecord frame{pose.estimate, pose.publish_us, std::nullopt, std::nullopt, std::nullopt};
+    frame.map_wait_ms = 1e-3 * static_cast<double>(pose.estimate.map_wait_us);
     if (!frames.empty()) {
       frame.pose_time_ms = 1e-3 * static_cast<double>(pose.publish_us - frames.back().publish_us);
     }
@@ -98,16 +80,10 @@ FrameCounts RunRecord::Counts() const {
   return counts;
 }
 
-int64_t RunRecord::num_landmarks() const {
-  return poses_.empty() ? 0 : poses_.rbegin()->second.estimate.num_landmarks;
-}
-
 StampedPose RunRecord::FinalPose(const PoseEstimate& estimate) const {
-  const auto reference = keyframes_.find(estimate.reference_keyframe);
-  const Rigid3 world_from_camera = reference == keyframes_.end() ? estimate.world_from_camera
-                                                                 : reference->second.pose.world_from_camera *
-                                                                       estimate.reference_from_camera;
-  return {estimate.frame, estimate.utime_us, world_from_camera};
+  const std::optional<Rigid3> world_from_reference = removed_.Find(map_, estimate.reference_keyframe);
+  return {estimate.frame, estimate.utime_us,
+          world_from_reference ? *world_from_reference * estimate.reference_from_camera : estimate.world_from_camera};
 }
 
 std::vector<StampedPose> RunRecord::Trajectory() const {
@@ -151,9 +127,9 @@ std::vector<Rigid3> RunRecord::PosePerFrame() const {
 
 std::vector<StampedPose> RunRecord::Keyframes() const {
   std::vector<StampedPose> keyframes;
-  for (const auto& [id, keyframe] : keyframes_) {
-    keyframes.push_back(keyframe.pose);
-  }
+  map_.keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
+    keyframes.push_back({keyframe.features->frame, keyframe.features->utime_us, keyframe.world_from_camera});
+  });
   return keyframes;
 }
 
@@ -171,14 +147,6 @@ std::string RunRecord::TrajectorySha256() const {
     hash.Add(pose.frame.value);
     hash.Add(pose.utime_us);
     AddPoseBits(pose.world_from_camera, hash);
-  }
-  return hash.HexDigest();
-}
-
-std::string RunRecord::MapSha256() const {
-  Sha256 hash;
-  for (const auto& [id, keyframe] : keyframes_) {
-    hash.Add(keyframe.sha256.data(), keyframe.sha256.size());
   }
   return hash.HexDigest();
 }

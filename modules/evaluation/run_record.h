@@ -1,5 +1,5 @@
-// What is known of a run: every pose, keyframe and true pose, and the figures of the stages. All that a run's
-// folder tells is derived from it.
+// What is known of a run: every pose and true pose, the map, and the figures of the stages. All that a run's folder
+// tells is derived from it.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +12,8 @@
 #include "evaluation/statistics.h"
 #include "geometry/camera_frame.h"
 #include "geometry/rigid3.h"
+#include "map/map.h"
+#include "map/removed_keyframes.h"
 #include "map/tracking_types.h"
 
 namespace tessera {
@@ -28,6 +30,7 @@ struct FrameRecord {
   int64_t publish_us = 0;              // wall clock at which the pose was published
   std::optional<double> pose_time_ms;  // since the pose before it was published; none for the first
   std::optional<double> latency_ms;  // since the dispatcher first heard of the frame; none if that is unknown
+  std::optional<double> map_wait_ms;  // how long it waited in the tracker for changes of the map
 };
 
 struct FrameCounts {
@@ -51,7 +54,8 @@ class RunRecord {
  public:
   // What comes twice counts once: the first.
   void AddPose(const PoseEstimate& pose, int64_t publish_us);
-  void AddKeyframe(const KeyframeObservation& keyframe);
+  // The next change of the map. Returns Map::Apply's sentence.
+  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
   void AddGroundTruth(const GroundTruthPose& truth);
   // The newest figures replace those before.
   void SetStage(const std::string& name, const StageFigures& figures);
@@ -64,11 +68,10 @@ class RunRecord {
   // Frames in order of their numbers.
   std::vector<FrameRecord> Frames() const;
   FrameCounts Counts() const;
-  int64_t num_keyframes() const { return static_cast<int64_t>(keyframes_.size()); }
-  int64_t num_landmarks() const;  // in the map at the last frame
+  const Map& map() const { return map_; }
   const std::map<std::string, StageFigures>& stages() const { return stages_; }
 
-  // Tracked frames, where the map puts them at the end:
+  // Tracked frames, where the map puts them at the end, also those whose reference is no longer in it:
   //   world_from_camera = world_from_reference (now) * reference_from_camera (then)
   std::vector<StampedPose> Trajectory() const;
   // Tracked frames as they were published at the time.
@@ -76,27 +79,22 @@ class RunRecord {
   // One pose for every frame of the source: a frame without one takes the last before it; before the first,
   // the origin of the world.
   std::vector<Rigid3> PosePerFrame() const;
-  std::vector<StampedPose> Keyframes() const;
+  std::vector<StampedPose> Keyframes() const;  // of the map
   std::vector<StampedPose> GroundTruth() const;
 
   // Over the exact bits of Trajectory(): frame, time, tx ty tz qx qy qz qw.
   std::string TrajectorySha256() const;
-  // Over the keyframes: id, frame, pose, position of every keypoint, and the landmark it saw.
-  std::string MapSha256() const;
 
  private:
   struct Pose {
     PoseEstimate estimate;
     int64_t publish_us = 0;
   };
-  struct Keyframe {
-    StampedPose pose;
-    std::string sha256;  // of all that the map's hash covers
-  };
   StampedPose FinalPose(const PoseEstimate& estimate) const;
 
   std::map<FrameId, Pose> poses_;
-  std::map<KeyframeId, Keyframe> keyframes_;
+  Map map_;
+  RemovedKeyframes removed_;
   std::map<FrameId, StampedPose> truth_;
   std::map<std::string, StageFigures> stages_;
   std::optional<int64_t> end_num_frames_;

@@ -65,6 +65,15 @@ inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
   return SubtractSaturated(Max(BestArc(brighter), BestArc(darker)), one);
 }
 
+// Where between the places -1 and 1 a parabola through three scores has its maximum, in 1/kCornerSubpixels, rounded to
+// nearest: (after - before) / (2 (2 best - before - after)); before and after <= best.
+inline int8_t ParabolaMaximum(int before, int best, int after) {
+  const int curvature = 2 * best - before - after;
+  if (curvature == 0) return 0;
+  const int slope = (after - before) * (kCornerSubpixels / 2);
+  return static_cast<int8_t>((slope + (slope < 0 ? -curvature : curvature) / 2) / curvature);
+}
+
 }  // namespace
 
 void CornerDetector::ScoreRow(const LevelImage& image, const Rect& corners, int y, int min_score) {
@@ -73,6 +82,18 @@ void CornerDetector::ScoreRow(const LevelImage& image, const Rect& corners, int 
   uint8_t* out = ScoreRowAt(y) + kRowRoom - 1;
   const uint8_t* in = image.At(corners.x - 1, y);
   for (int x = 0; x < corners.width + 2; x += kLanes) simd::Store(out + x, Scores(in + x, ring, below_min_score));
+}
+
+CornerDetector::Corner CornerDetector::CornerAt(const Rect& corners, int x, int y, int min_score) {
+  const int column = kRowRoom + x - corners.x;
+  const uint8_t* row = ScoreRowAt(y) + column;
+  // Lower ones may or may not have been computed, which depends on the cut.
+  const auto at_least = [min_score](uint8_t score) { return std::max<int>(score, min_score - 1); };
+  return {.x = static_cast<int16_t>(x),
+          .y = static_cast<int16_t>(y),
+          .offset_x = ParabolaMaximum(at_least(row[-1]), row[0], at_least(row[1])),
+          .offset_y = ParabolaMaximum(at_least(ScoreRowAt(y - 1)[column]), row[0], at_least(ScoreRowAt(y + 1)[column])),
+          .score = row[0]};
 }
 
 void CornerDetector::Insert(size_t cell, Corner corner) {
@@ -106,7 +127,7 @@ void CornerDetector::KeepMaxima(const Rect& corners, int y, int min_score) {
     for (; maxima != 0; maxima &= maxima - 1) {
       const int column = x + std::countr_zero(maxima);
       if (row[column] > lowest_[cell]) {
-        Insert(cell, {static_cast<int16_t>(corners.x + column), static_cast<int16_t>(y), row[column]});
+        Insert(cell, CornerAt(corners, corners.x + column, y, min_score));
       }
     }
   }
@@ -133,7 +154,12 @@ void CornerDetector::Detect(const LevelImage& image, const LevelPlan& plan, int 
     for (size_t cell = 0; cell < num_columns; ++cell) {
       for (int i = 0; i < num_best_[cell]; ++i) {
         const Corner& corner = best_[cell * static_cast<size_t>(capacity_) + static_cast<size_t>(i)];
-        out.push_back({.x = corner.x, .y = corner.y, .level = static_cast<uint8_t>(level), .score = corner.score});
+        out.push_back({.x = corner.x,
+                       .y = corner.y,
+                       .offset_x = corner.offset_x,
+                       .offset_y = corner.offset_y,
+                       .level = static_cast<uint8_t>(level),
+                       .score = corner.score});
       }
       num_best_[cell] = 0;
       lowest_[cell] = static_cast<uint8_t>(min_score - 1);

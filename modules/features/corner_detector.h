@@ -12,11 +12,14 @@ namespace tessera {
 
 class CornerDetector {
  public:
-  // Appends the corners of the plan's cells, cell by cell, best first, `capacity` per cell at most. The image must hold
-  // plan.left.
+  // Appends the corners of the plan's cells, cell by cell, best first, `capacity` per cell at most. The image,
+  // smoothed lightly so that noise makes no corners, must hold 4 px around plan.corners.
   //
   // score(p): the largest threshold t for which p is a corner, i.e. nine neighbouring pixels of the ring of 16 are all
   // brighter than p + t, or all darker than p - t.
+  //
+  // Between the pixels the corner stands where the parabola through the scores of three neighbours of a row or column has
+  // its maximum; scores below min_score count as min_score - 1.
   //
   // A corner counts if its score is at least min_score and the highest among its eight neighbours; of equal neighbours
   // the first in reading order counts. Within a cell, a higher score is better, then the first in reading order.
@@ -27,11 +30,14 @@ class CornerDetector {
   struct Corner {
     int16_t x = 0;
     int16_t y = 0;
+    int8_t offset_x = 0;
+    int8_t offset_y = 0;
     uint8_t score = 0;
   };
 
   void ScoreRow(const LevelImage& image, const Rect& corners, int y, int min_score);
   void KeepMaxima(const Rect& corners, int y, int min_score);
+  Corner CornerAt(const Rect& corners, int x, int y, int min_score);
   void Insert(size_t cell, Corner corner);
   uint8_t* ScoreRowAt(int y) { return score_rows_[static_cast<size_t>(y % 3)].data(); }
 

@@ -11,7 +11,6 @@
 namespace tessera {
 namespace {
 
-using simd::Average;
 using simd::Load8;
 using simd::U16x16;
 using simd::U8x32;
@@ -45,13 +44,12 @@ constexpr std::array<uint16_t, 16> MakeColumns(int first) {
 constexpr std::array<uint16_t, 16> kEvenColumns = MakeColumns(0);
 constexpr std::array<uint16_t, 16> kOddColumns = MakeColumns(1);
 
-// round(2^16 tan((k + 1/2) / 256 turn)), k = 0 .. 31: the bounds between neighbouring angles of the first octant.
+// round(2^22 tan((k + 1/2) / 256 turn)), k = 0 .. 31: the bounds between neighbouring angles of the first octant.
+constexpr int kTangentBits = 22;  // AngleOf's numbers have 40 bits at most, so products fit 63
 constexpr std::array<int64_t, 32> kTangents = {
-    804,   2414,  4026,  5644,  7268,  8901,  10545, 12202, 13874, 15564, 17273, 19005, 20762, 22546, 24360, 26208,
-    28093, 30018, 31986, 34002, 36071, 38196, 40382, 42636, 44963, 47369, 49863, 52451, 55144, 57950, 60880, 63947};
-
-// Taps (1 2 1) / 4 with centre b.
-inline U8x32 Smooth3(U8x32 a, U8x32 b, U8x32 c) { return Average(Average(a, c), b); }
+    51474, 154485, 257683, 361192, 465140, 569655, 674869, 780918, 887941, 996082, 1105491, 1216326, 1328749, 1442935,
+    1559067, 1677337, 1797952, 1921133, 2047115, 2176153, 2308520, 2444513, 2584454, 2728694, 2877616, 3031640,
+    3191228, 3356892, 3529196, 3708768, 3896309, 4092603};
 
 }  // namespace
 
@@ -60,7 +58,7 @@ uint8_t AngleOf(int64_t x, int64_t y) {
   const int64_t smaller = std::min(std::abs(x), std::abs(y));
   if (larger == 0) return 0;
   const auto bound = std::partition_point(kTangents.begin(), kTangents.end(), [&](int64_t tangent) {
-    return tangent * larger <= smaller << 16;
+    return tangent * larger <= smaller << kTangentBits;
   });
   auto angle = static_cast<int>(bound - kTangents.begin());
   if (std::abs(y) > std::abs(x)) angle = 64 - angle;
@@ -98,35 +96,6 @@ uint8_t Orientation(const LevelImage& image, int x, int y) {
                            simd::SignedDot(odd_sums, simd::Load16(kOddColumns.data()));
   const int32_t y_moment = simd::SignedDot(y_moments, ones) + simd::SignedDot(odd_y_moments, ones);
   return AngleOf(x_moment, y_moment);
-}
-
-void Smoother::SmoothNear(const LevelImage& image, const Rect& region, int y) {
-  uint8_t* out = NearRow(y);
-  const uint8_t* in = image.At(region.x - kBlurRadiusPx, y);
-  const ptrdiff_t stride = image.stride();
-  for (int x = 0; x < region.width + 2 * kBlurRadiusPx; x += 32) {
-    simd::Store(out + x, Smooth3(Load8(in + x - stride), Load8(in + x), Load8(in + x + stride)));
-  }
-}
-
-void Smoother::Smooth(const LevelImage& image, const Rect& region, LevelImage& out) {
-  out.Reset(region);
-  const size_t row_size = static_cast<size_t>(region.width) + 2 * kBlurRadiusPx + 64;
-  for (auto& row : near_rows_) row.resize(std::max(row.size(), row_size));
-  row_.resize(std::max(row_.size(), row_size));
-  for (int y = region.y - 2; y < region.y + 2; ++y) SmoothNear(image, region, y);
-  for (int y = region.y; y < region.bottom(); ++y) {
-    SmoothNear(image, region, y + 2);
-    for (int x = 0; x < region.width + 2 * kBlurRadiusPx; x += 32) {
-      simd::Store(row_.data() + x,
-                  Smooth3(Load8(NearRow(y - 2) + x), Load8(NearRow(y) + x), Load8(NearRow(y + 2) + x)));
-    }
-    uint8_t* out_row = out.At(region.x, y);
-    for (int x = 0; x < region.width; x += 32) {
-      const auto near = [row = row_.data() + x](int i) { return Smooth3(Load8(row + i), Load8(row + i + 1), Load8(row + i + 2)); };
-      simd::Store(out_row + x, Smooth3(near(0), near(2), near(4)));
-    }
-  }
 }
 
 Descriptor Describe(const LevelImage& smoothed, int x, int y, uint8_t angle) {

@@ -15,6 +15,10 @@ float DepthAt(const TileJob& job, const Candidate& candidate) {
   return static_cast<float>(job.depth.row(y)[x] * job.calibration.depth_unit_m);
 }
 
+Rect Grow(const Rect& rect, int margin) {
+  return {.x = rect.x - margin, .y = rect.y - margin, .width = rect.width + 2 * margin, .height = rect.height + 2 * margin};
+}
+
 bool IsWholeImage(const TileJob& job) {
   return job.first_level == 0 && job.last_level == job.options.num_levels - 1 &&
          job.core == Rect{0, 0, job.calibration.width_px, job.calibration.height_px};
@@ -66,7 +70,9 @@ void Extractor::DetectCandidates(const TileJob& job) {
     const auto l = static_cast<size_t>(level);
     const LevelPlan& plan = plan_.levels[l];
     const int capacity = CellCapacity(job.options, level, plan.width, plan.height);
-    detector_.Detect(left_[l], plan, level, job.options.min_score, capacity, candidates_);
+    if (plan.corners.empty()) continue;
+    smoother_.Smooth(left_[l], Grow(plan.corners, kPatchRadiusPx + 2), 1, smoothed_[l]);
+    detector_.Detect(smoothed_[l], plan, level, job.options.min_score, capacity, candidates_);
   }
   if (!IsWholeImage(job)) return;
   // Nothing of the image is missing, so those that will not be selected need no descriptor.
@@ -84,15 +90,10 @@ void Extractor::DescribeCandidates(TileFeatures& features) {
     const auto level = static_cast<size_t>(candidate.level);
     if (candidate.level != smoothed_level) {
       smoothed_level = candidate.level;
-      const Rect& corners = plan_.levels[level].corners;
-      const Rect patches{.x = corners.x - kPatchRadiusPx,
-                         .y = corners.y - kPatchRadiusPx,
-                         .width = corners.width + 2 * kPatchRadiusPx,
-                         .height = corners.height + 2 * kPatchRadiusPx};
-      smoother_.Smooth(left_[level], patches, smoothed_[level]);
+      smoother_.Smooth(smoothed_[level], Grow(plan_.levels[level].corners, kPatchRadiusPx), 2, doubly_smoothed_);
     }
-    candidate.angle = Orientation(left_[level], candidate.x, candidate.y);
-    features.descriptors.push_back(Describe(smoothed_[level], candidate.x, candidate.y, candidate.angle));
+    candidate.angle = Orientation(smoothed_[level], candidate.x, candidate.y);
+    features.descriptors.push_back(Describe(doubly_smoothed_, candidate.x, candidate.y, candidate.angle));
   }
 }
 
@@ -102,8 +103,10 @@ void Extractor::MatchCandidates(const FeatureOptions& options) {
     const std::optional<int> right_x = matcher_.Match(left_[level], right_[level], candidate.x, candidate.y,
                                                       LevelDisparity(options, candidate.level));
     if (!right_x) continue;
-    candidate.right_x_px =
-        LevelZeroPosition(static_cast<double>(*right_x) / StereoMatcher::kSubpixels, candidate.level);
+    // The disparity is that of the pixel; the corner beside it is seen as far beside in both images.
+    const double corner_x = static_cast<double>(*right_x) / StereoMatcher::kSubpixels +
+                            static_cast<double>(candidate.offset_x) / kCornerSubpixels;
+    candidate.right_x_px = LevelZeroPosition(corner_x, candidate.level);
   }
 }
 

@@ -8,6 +8,7 @@
 #include "features/descriptor.h"
 #include "features/feature_types.h"
 #include "features/pyramid.h"
+#include "features/smoother.h"
 #include "features/stereo_matcher.h"
 #include "features/tile_plan.h"
 
@@ -31,7 +32,8 @@ class Extractor {
   TilePlan plan_;
   std::array<LevelImage, kMaxLevels> left_;
   std::array<LevelImage, kMaxLevels> right_;
-  std::array<LevelImage, kMaxLevels> smoothed_;
+  std::array<LevelImage, kMaxLevels> smoothed_;  // once: corners and orientations are found there
+  LevelImage doubly_smoothed_;                   // one level at a time: descriptors compare its pixels
   PyramidReducer reducer_;
   CornerDetector detector_;
   Smoother smoother_;

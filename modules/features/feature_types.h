@@ -84,10 +84,14 @@ struct TileJob {
   bool operator==(const TileJob&) const = default;
 };
 
+inline constexpr int kCornerSubpixels = 64;
+
 // A keypoint that may be selected.
 struct Candidate {
   int16_t x = 0;  // pixel of its pyramid level, in coordinates of the whole level image
   int16_t y = 0;
+  int8_t offset_x = 0;      // from there to the corner, 1/kCornerSubpixels px of its level, half a pixel at most
+  int8_t offset_y = 0;
   uint8_t level = 0;
   uint8_t angle = 0;        // 1/256 turn
   uint16_t score = 0;       // strength

@@ -6,7 +6,7 @@ namespace tessera {
 namespace {
 
 // A level yields about this many candidates per selected keypoint, if all cells have enough corners.
-constexpr int kCandidatesPerKeypoint = 3;
+constexpr int kCandidatesPerKeypoint = 4;
 constexpr int kMinCellCapacity = 3;
 constexpr int kMaxCellCapacity = 32;
 

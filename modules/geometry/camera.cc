@@ -25,6 +25,9 @@ std::string CameraCalibration::Check() const {
   if (!positive(fx_px) || !positive(fy_px) || !std::isfinite(cx_px) || !std::isfinite(cy_px)) {
     return "focal lengths must be positive and the principal point finite";
   }
+  if (sensor != SensorType::kMono && sensor != SensorType::kStereo && sensor != SensorType::kRgbd) {
+    return "the sensor type " + std::to_string(static_cast<int>(sensor)) + " does not exist";
+  }
   if (sensor == SensorType::kStereo && !positive(baseline_m)) {
     return "a stereo camera needs a positive baseline";
   }

@@ -36,6 +36,7 @@ struct EndOfStream {
   std::string stage;
   int64_t num_frames = 0;
   int64_t num_dropped = 0;
+  int64_t num_values = 0;  // tracker: keyframes sent; mapper: deltas sent. Others wait for the last; the rest: 0
 };
 
 }  // namespace tessera

@@ -30,13 +30,25 @@ class FactHash {
   uint64_t state_;
 };
 
+uint64_t HashOf(const FeatureFrame& features) {
+  FactHash hash(4);
+  hash.Add(features.frame.value).Add(features.utime_us).Add(static_cast<int64_t>(features.keypoints.size()));
+  for (size_t i = 0; i < features.keypoints.size(); ++i) {
+    const Keypoint& k = features.keypoints[i];
+    hash.Add(uint64_t{std::bit_cast<uint32_t>(k.x_px)} << 32 | std::bit_cast<uint32_t>(k.y_px));
+    hash.Add(uint64_t{std::bit_cast<uint32_t>(k.right_x_px)} << 32 | std::bit_cast<uint32_t>(k.depth_m));
+    hash.Add(uint64_t{k.score} << 16 | uint64_t{k.level} << 8 | k.angle);
+    for (const uint64_t word : features.descriptors[i]) hash.Add(word);
+  }
+  return hash.value();
+}
+
 uint64_t HashOf(KeyframeId id, const Keyframe& keyframe) {
   const Eigen::Quaterniond& q = keyframe.world_from_camera.rotation;
   return FactHash(1)
       .Add(id.value)
       .Add(keyframe.parent.value)
-      .Add(keyframe.features->frame.value)
-      .Add(static_cast<int64_t>(keyframe.features->keypoints.size()))
+      .Add(keyframe.features_hash)
       .Add(q.w())
       .Add(q.x())
       .Add(q.y())
@@ -61,6 +73,9 @@ uint64_t HashOf(const MapDelta::ChangedObservation& fact) {
       .value();
 }
 
+// A replica keeps a slot for each id up to the highest: one that leaps ahead of all others is nonsense.
+constexpr int64_t kMaxIdLeap = int64_t{1} << 20;
+
 std::string Name(KeyframeId id) { return "keyframe " + std::to_string(id.value); }
 std::string Name(LandmarkId id) { return "landmark " + std::to_string(id.value); }
 
@@ -78,6 +93,7 @@ std::string Map::Apply(const MapDelta& delta) {
     return "delta " + std::to_string(delta.number) + ": " + problem;
   }
   ++next_delta_;
+  answered_ = delta.answers;
   if (hash_ != delta.hash) {
     return "delta " + std::to_string(delta.number) + ": this replica of the map differs from the mapper's (wrong hash)";
   }
@@ -86,12 +102,14 @@ std::string Map::Apply(const MapDelta& delta) {
 
 std::string Map::ApplyLists(const MapDelta& delta) {
   for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
-    if (!added.id.valid() || keyframes_.Has(added.id) || added.features == nullptr) {
+    if (!added.id.valid() || keyframes_.Has(added.id) || added.id.value > keyframes_.end_id() + kMaxIdLeap ||
+        added.features == nullptr || added.features->descriptors.size() != added.features->keypoints.size()) {
       return Name(added.id) + " can't be added";
     }
     const size_t num_keypoints = added.features->keypoints.size();
-    const Keyframe& keyframe = keyframes_.Put(
-        added.id, {added.features, added.world_from_camera, added.parent, std::vector<LandmarkId>(num_keypoints), {}});
+    const Keyframe& keyframe =
+        keyframes_.Put(added.id, {added.features, HashOf(*added.features), added.world_from_camera, added.parent,
+                                  std::vector<LandmarkId>(num_keypoints), {}});
     hash_ += HashOf(added.id, keyframe);
   }
   for (const MapDelta::MovedKeyframe& moved : delta.moved_keyframes) {
@@ -102,7 +120,7 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     hash_ += HashOf(moved.id, *keyframe);
   }
   for (const auto& [id, landmark] : delta.changed_landmarks) {
-    if (!id.valid()) return "a landmark without an id";
+    if (!id.valid() || id.value > landmarks_.end_id() + kMaxIdLeap) return Name(id) + " can't be added";
     if (Landmark* old = landmarks_.Find(id); old != nullptr) {
       hash_ -= HashOf(id, *old);
       *old = landmark;
@@ -213,6 +231,7 @@ std::vector<KeyframeId> Map::Covisible(KeyframeId id, int max_num, int min_share
 MapDelta Map::Snapshot() const {
   MapDelta delta;
   delta.number = next_delta_ == 0 ? 0 : next_delta_ - 1;
+  delta.answers = answered_;
   delta.is_snapshot = true;
   delta.hash = hash_;
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
@@ -231,7 +250,7 @@ std::string Map::Sha256Hex() const {
   Sha256 sha;
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
     sha.Add(id.value);
-    sha.Add(keyframe.features->frame.value);
+    sha.Add(static_cast<int64_t>(keyframe.features_hash));
     sha.Add(keyframe.parent.value);
     const Eigen::Quaterniond& q = keyframe.world_from_camera.rotation;
     const Eigen::Vector3d& t = keyframe.world_from_camera.translation;

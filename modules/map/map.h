@@ -39,6 +39,7 @@ struct Landmark {
 // A keyframe in the map: its features never change, its pose does.
 struct Keyframe {
   std::shared_ptr<const FeatureFrame> features;
+  uint64_t features_hash = 0;  // of their exact content
   Rigid3 world_from_camera;
   KeyframeId parent;  // spanning tree: the older keyframe that shared most landmarks at birth; invalid: the root
   std::vector<LandmarkId> landmarks;         // by keypoint; invalid: none
@@ -92,6 +93,8 @@ class Map {
 
   // Number that the next delta must have.
   int64_t next_delta() const { return next_delta_; }
+  // The keyframe that the last delta answered; invalid: there was none.
+  KeyframeId answered() const { return answered_; }
   // Depends on the exact content alone, not on the way that led to it; kept up to date by each change.
   uint64_t hash() const { return hash_; }
 
@@ -122,6 +125,7 @@ class Map {
   IdMap<LandmarkId, Landmark> landmarks_;
   IdMap<LandmarkId, std::vector<Observation>> observations_;
   int64_t next_delta_ = 0;
+  KeyframeId answered_;
   uint64_t hash_ = 0;
 };
 

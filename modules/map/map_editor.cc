@@ -125,6 +125,7 @@ MapDelta MapEditor::Finish(KeyframeId answers) {
   delta.removed_keyframes.assign(removed_keyframes_.begin(), removed_keyframes_.end());
   delta.hash = map_.hash();
   map_.next_delta_ = number_ + 1;
+  map_.answered_ = answers;
   return delta;
 }
 

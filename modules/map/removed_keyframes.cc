@@ -1,11 +1,19 @@
 #include "map/removed_keyframes.h"
 
+#include <set>
+
 namespace tessera {
 
 void RemovedKeyframes::Remember(const Map& map, const MapDelta& delta) {
   for (const KeyframeId id : delta.removed_keyframes) {
     Remember(map, id);
   }
+  if (!delta.is_snapshot) return;
+  std::set<KeyframeId> kept;
+  for (const MapDelta::NewKeyframe& keyframe : delta.new_keyframes) kept.insert(keyframe.id);
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
+    if (!kept.contains(id)) Remember(map, id);
+  });
 }
 
 void RemovedKeyframes::Remember(const Map& map, KeyframeId id) {

@@ -11,7 +11,8 @@ namespace tessera {
 class RemovedKeyframes {
  public:
   // To be called with each delta before it is applied to `map`. Removed keyframes are tied to their parent, as it stands
-  // in the map then (a parent that goes too, or has gone before, passes them on to its own).
+  // in the map then (a parent that goes too, or has gone before, passes them on to its own). A snapshot removes all that
+  // it does not hold.
   void Remember(const Map& map, const MapDelta& delta);
   // Ties one keyframe of the map to its parent.
   void Remember(const Map& map, KeyframeId id);

@@ -30,6 +30,9 @@ struct PoseEstimate {
   int32_t num_inliers = 0;            // of those, consistent with the pose
   int32_t num_landmarks = 0;          // landmarks in the map
   bool is_keyframe = false;
+  int64_t num_deltas = 0;             // deltas that the map had seen by then: its step
+  bool is_live = false;               // the step is what happened to be there, not what logical time asks for
+  int64_t map_wait_us = 0;            // how long the frame had to wait for its step; for measuring only
 };
 
 // A keypoint that sees what a keypoint of an earlier keyframe saw, said before the tracker knows the landmark's id.
@@ -49,6 +52,7 @@ struct KeyframeObservation {
   KeyframeId reference;                     // the keyframe that the estimate is relative to; invalid: a new part begins
   Rigid3 reference_from_camera;             // what is left true when the reference moves
   std::vector<SharedKeypoint> shared;       // points without an id yet: mono's first ones, or from depth
+  int64_t num_deltas = 0;                   // as in PoseEstimate
 };
 
 }  // namespace tessera

@@ -11,7 +11,7 @@ Landmark InWorld(const Rigid3& world_from_camera, Landmark point) {
 std::string MapReplica::Apply(const MapDelta& delta) {
   removed_.Remember(map_, delta);
   std::string problem = map_.Apply(delta);
-  sent_.erase(delta.answers);
+  sent_.erase(sent_.begin(), sent_.upper_bound(delta.answers));  // answered in order; a snapshot answers several
   return problem;
 }
 

@@ -22,21 +22,6 @@ std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::
   return DropUnlikeTurns(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
 }
 
-std::vector<Match> MatchEverywhere(const FrameView& first, std::span<const int32_t> of_first, const FrameView& second,
-                                   const MatchingOptions& options) {
-  std::vector<Match> matches;
-  for (const int32_t i : of_first) {
-    BestMatch best;
-    for (int32_t j = 0; j < second.size(); ++j) {
-      best.Offer(j, HammingDistance(first.descriptor(i), second.descriptor(j)));
-    }
-    if (best.IsClear(options)) {
-      matches.push_back({i, best.index, best.distance});
-    }
-  }
-  return DropUnlikeTurns(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
-}
-
 std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second) {
   std::vector<int32_t> best(static_cast<size_t>(num_second), -1);  // by second: index into matches
   for (size_t i = 0; i < matches.size(); ++i) {

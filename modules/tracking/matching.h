@@ -26,10 +26,6 @@ struct MatchingOptions {
 std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::Vector2d> centers_px,
                                  const FrameView& second, double radius_px, const MatchingOptions& options);
 
-// Keypoints `of_first` of the first frame against all of the second, without a guess of where they are.
-std::vector<Match> MatchEverywhere(const FrameView& first, std::span<const int32_t> of_first, const FrameView& second,
-                                   const MatchingOptions& options);
-
 // Best and second best candidate so far.
 struct BestMatch {
   int32_t index = -1;

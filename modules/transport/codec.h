@@ -14,6 +14,7 @@
 
 #include "features/feature_types.h"
 #include "geometry/camera_frame.h"
+#include "map/map_exchange.h"
 #include "map/tracking_types.h"
 #include "transport/bytes.h"
 #include "transport/stage_messages.h"
@@ -32,6 +33,14 @@ inline constexpr Delivery kDelivery = Delivery::kFromFirst;
 // Jobs given to an extractor that died are given to others: its successor must not do them again.
 template <>
 inline constexpr Delivery kDelivery<TileJob> = Delivery::kFromNow;
+// The map has a way of its own to catch up (MapFollower), which spares a late listener, and all others on the bus, the
+// whole history.
+template <>
+inline constexpr Delivery kDelivery<MapDelta> = Delivery::kFromNow;
+template <>
+inline constexpr Delivery kDelivery<MapSnapshotPage> = Delivery::kFromNow;
+template <>
+inline constexpr Delivery kDelivery<MapRequest> = Delivery::kFromNow;
 template <>
 inline constexpr Delivery kDelivery<ExtractorReady> = Delivery::kUnordered;
 template <>

@@ -132,12 +132,17 @@ struct Codec<EndOfStream> {
     message->stage = Printable(end.stage);
     message->num_frames = end.num_frames;
     message->num_dropped = end.num_dropped;
+    message->num_values = end.num_values;
     emit(*message);
   }
   static std::string Join(const Message& message, EndOfStream* end) {
-    *end = {.stage = message.stage, .num_frames = message.num_frames, .num_dropped = message.num_dropped};
+    *end = {.stage = message.stage,
+            .num_frames = message.num_frames,
+            .num_dropped = message.num_dropped,
+            .num_values = message.num_values};
     return FirstProblem({CheckFrame(message.num_frames),
-                         Require(!end->stage.empty() && end->num_dropped >= 0 && end->num_dropped <= end->num_frames,
+                         Require(!end->stage.empty() && end->num_dropped >= 0 && end->num_dropped <= end->num_frames &&
+                                     end->num_values >= 0,
                                  "its stage is empty or its counts are out of range")});
   }
 };

@@ -122,6 +122,13 @@ std::string FromMessage(const rigid3_t& message, Rigid3* transform) {
   return "";
 }
 
+void ToMessage(const Eigen::Vector3d& vector, double* message) { std::copy(vector.begin(), vector.end(), message); }
+
+bool FromMessage(const double* message, Eigen::Vector3d* vector) {
+  *vector = {message[0], message[1], message[2]};
+  return vector->cwiseAbs().maxCoeff() <= kMaxCoordinate && vector->allFinite();
+}
+
 feature_options_t ToMessage(const FeatureOptions& options) {
   feature_options_t message;
   message.num_features = options.num_features;

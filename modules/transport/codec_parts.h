@@ -36,6 +36,10 @@ rigid3_t ToMessage(const Rigid3& transform);
 // Refuses what is not finite, not within 10^9 m, or whose quaternion is not of length 1.
 std::string FromMessage(const rigid3_t& message, Rigid3* transform);
 
+// A position, m (mono: units of the map). False if it is not finite or not within 10^9.
+void ToMessage(const Eigen::Vector3d& vector, double* message);
+bool FromMessage(const double* message, Eigen::Vector3d* vector);
+
 feature_options_t ToMessage(const FeatureOptions& options);
 std::string FromMessage(const feature_options_t& message, FeatureOptions* options);
 

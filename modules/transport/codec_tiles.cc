@@ -1,6 +1,7 @@
 // TILE_<n>, TILE_FEATURES, TILE_ACK, EXTRACTOR_READY.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "tessera/extractor_ready_t.hpp"
 #include "tessera/tile_ack_t.hpp"
@@ -129,7 +130,7 @@ template <>
 struct Codec<TileFeatures> {
   using Message = tile_features_t;
   static constexpr const char* kTypeName = "tile_features_t";
-  static constexpr size_t kBytesPerCandidate = 2 + 2 + 1 + 1 + 4 + 4 + 4 + 32;
+  static constexpr size_t kBytesPerCandidate = 2 + 2 + 1 + 1 + 1 + 1 + 4 + 4 + 4 + 32;
 
   template <class Emit>
   static void Cut(const TileFeatures& features, Message* message, size_t max_bytes, Emit emit) {
@@ -166,6 +167,8 @@ struct Codec<TileFeatures> {
       }
       features->candidates.push_back({.x = message.x[i],
                                       .y = message.y[i],
+                                      .offset_x = message.offset_x[i],
+                                      .offset_y = message.offset_y[i],
                                       .level = message.level[i],
                                       .angle = message.angle[i],
                                       .score = static_cast<uint16_t>(message.score[i]),
@@ -182,6 +185,8 @@ struct Codec<TileFeatures> {
     message->num_candidates = static_cast<int32_t>(num);
     message->x.resize(num);
     message->y.resize(num);
+    message->offset_x.resize(num);
+    message->offset_y.resize(num);
     message->level.resize(num);
     message->angle.resize(num);
     message->score.resize(num);
@@ -192,6 +197,8 @@ struct Codec<TileFeatures> {
       const Candidate& candidate = features.candidates[first + i];
       message->x[i] = candidate.x;
       message->y[i] = candidate.y;
+      message->offset_x[i] = candidate.offset_x;
+      message->offset_y[i] = candidate.offset_y;
       message->level[i] = candidate.level;
       message->angle[i] = candidate.angle;
       message->score[i] = candidate.score;
@@ -201,7 +208,9 @@ struct Codec<TileFeatures> {
     }
   }
   static bool IsInRange(const Message& message, size_t i, const TileFeatures& features) {
-    return message.x[i] >= 0 && message.x[i] < features.calibration.width_px && message.y[i] >= 0 &&
+    const auto is_within_pixel = [](int offset) { return 2 * std::abs(offset) <= kCornerSubpixels; };
+    return is_within_pixel(message.offset_x[i]) && is_within_pixel(message.offset_y[i]) &&
+           message.x[i] >= 0 && message.x[i] < features.calibration.width_px && message.y[i] >= 0 &&
            message.y[i] < features.calibration.height_px && message.level[i] < features.options.num_levels &&
            message.score[i] >= 0 && message.score[i] <= UINT16_MAX && std::isfinite(message.right_x[i]) &&
            std::isfinite(message.depth_m[i]) && message.depth_m[i] >= 0.0F;

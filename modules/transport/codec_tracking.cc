@@ -1,95 +1,17 @@
 // FEATURES, POSE, KEYFRAME.
 #include <algorithm>
-#include <cmath>
 
 #include "tessera/features_t.hpp"
 #include "tessera/keyframe_t.hpp"
 #include "tessera/pose_t.hpp"
 #include "transport/codec_impl.h"
+#include "transport/codec_keypoints.h"
 #include "transport/codec_parts.h"
 
 namespace tessera {
 namespace {
 
-constexpr int32_t kMaxKeypoints = 1 << 20;
-constexpr size_t kBytesPerKeypoint = 4 + 4 + 1 + 1 + 4 + 4 + 4 + 32;
-
-// Everything but the keypoints themselves.
-void SetFrame(const FeatureFrame& frame, keypoints_t* message) {
-  message->frame = frame.frame.value;
-  message->utime = frame.utime_us;
-  message->arrival = frame.arrival_us;
-  message->camera = ToMessage(frame.calibration);
-  message->num_total = static_cast<int32_t>(frame.keypoints.size());
-}
-
-void FillKeypoints(const FeatureFrame& frame, size_t first, size_t num, keypoints_t* message) {
-  message->first = static_cast<int32_t>(first);
-  message->num_keypoints = static_cast<int32_t>(num);
-  message->x.resize(num);
-  message->y.resize(num);
-  message->level.resize(num);
-  message->angle.resize(num);
-  message->score.resize(num);
-  message->right_x.resize(num);
-  message->depth_m.resize(num);
-  message->descriptors.resize(num);
-  for (size_t i = 0; i < num; ++i) {
-    const Keypoint& keypoint = frame.keypoints[first + i];
-    message->x[i] = keypoint.x_px;
-    message->y[i] = keypoint.y_px;
-    message->level[i] = keypoint.level;
-    message->angle[i] = keypoint.angle;
-    message->score[i] = keypoint.score;
-    message->right_x[i] = keypoint.right_x_px;
-    message->depth_m[i] = keypoint.depth_m;
-    message->descriptors[i] = ToMessage(frame.descriptors[first + i]);
-  }
-}
-
-bool IsInRange(const keypoints_t& message, size_t i) {
-  // Keypoints of coarse levels may round to just beyond the last pixel.
-  return message.x[i] >= -1.0F && message.x[i] <= static_cast<float>(message.camera.width) && message.y[i] >= -1.0F &&
-         message.y[i] <= static_cast<float>(message.camera.height) && message.level[i] < kMaxLevels &&
-         message.score[i] >= 0 && message.score[i] <= UINT16_MAX && std::isfinite(message.right_x[i]) &&
-         std::isfinite(message.depth_m[i]) && message.depth_m[i] >= 0.0F;
-}
-
-std::string BeginFrame(const keypoints_t& message, FeatureFrame* frame) {
-  *frame = {};
-  frame->frame.value = message.frame;
-  frame->utime_us = message.utime;
-  frame->arrival_us = message.arrival;
-  return FirstProblem({CheckFrame(message.frame), CheckTimes(message.utime, message.arrival),
-                       FromMessage(message.camera, &frame->calibration)});
-}
-
-std::string JoinKeypoints(const header_t& header, const keypoints_t& message, FeatureFrame* frame) {
-  if (header.part == 0) {
-    if (std::string problem = BeginFrame(message, frame); !problem.empty()) return problem;
-  }
-  const size_t num_had = frame->keypoints.size();
-  const bool is_last = header.part + 1 == header.num_parts;
-  const auto num_now = static_cast<int64_t>(num_had) + message.num_keypoints;
-  if (message.frame != frame->frame.value || message.first != static_cast<int64_t>(num_had) ||
-      message.num_total > kMaxKeypoints || num_now > message.num_total || (is_last && num_now != message.num_total)) {
-    return "its parts do not fit together";
-  }
-  for (size_t i = 0; i < static_cast<size_t>(message.num_keypoints); ++i) {
-    if (!IsInRange(message, i)) {
-      return "a keypoint is out of range";
-    }
-    frame->keypoints.push_back({.x_px = message.x[i],
-                                .y_px = message.y[i],
-                                .right_x_px = message.right_x[i],
-                                .depth_m = message.depth_m[i],
-                                .score = static_cast<uint16_t>(message.score[i]),
-                                .level = message.level[i],
-                                .angle = message.angle[i]});
-    frame->descriptors.push_back(FromMessage(message.descriptors[i]));
-  }
-  return "";
-}
+constexpr const char* kIncomplete = "its parts do not fit together";
 
 }  // namespace
 
@@ -112,7 +34,9 @@ struct Codec<FeatureFrame> {
     } while (first < frame.keypoints.size());
   }
   static std::string Join(const Message& message, FeatureFrame* frame) {
-    return JoinKeypoints(message.header, message.keypoints, frame);
+    const bool is_last = message.header.part + 1 == message.header.num_parts;
+    const std::string problem = JoinKeypoints(message.keypoints, message.header.part == 0, frame);
+    return FirstProblem({problem, Require(!is_last || HasAllKeypoints(message.keypoints, *frame), kIncomplete)});
   }
 };
 TESSERA_CODEC(FeatureFrame);
@@ -121,42 +45,87 @@ template <>
 struct Codec<KeyframeObservation> {
   using Message = keyframe_t;
   static constexpr const char* kTypeName = "keyframe_t";
+  static constexpr size_t kBytesEach = kBytesPerKeypoint + 8;  // a keypoint and its landmark
+  static constexpr size_t kBytesPerShared = 4 + 8 + 4 + 3 * 8;
 
   template <class Emit>
   static void Cut(const KeyframeObservation& keyframe, Message* message, size_t max_bytes, Emit emit) {
     message->keyframe = keyframe.id.value;
     message->world_from_camera = ToMessage(keyframe.world_from_camera);
+    message->reference = keyframe.reference.value;
+    message->reference_from_camera = ToMessage(keyframe.reference_from_camera);
+    message->num_deltas = keyframe.num_deltas;
     SetFrame(keyframe.features, &message->keypoints);
-    const auto overhead = static_cast<size_t>(message->getEncodedSize());
-    const size_t per_part = std::max<size_t>(1, (max_bytes - overhead) / (kBytesPerKeypoint + 8));
-    size_t first = 0;
+    const size_t room = max_bytes - static_cast<size_t>(message->getEncodedSize());
+    const size_t num_keypoints = keyframe.features.keypoints.size();
+    size_t first = 0, first_shared = 0;
     do {
-      const size_t num = std::min(per_part, keyframe.features.keypoints.size() - first);
+      const size_t num = std::min(std::max<size_t>(1, room / kBytesEach), num_keypoints - first);
       FillKeypoints(keyframe.features, first, num, &message->keypoints);
       message->num_landmarks = static_cast<int32_t>(num);
       message->landmarks.resize(num);
-      for (size_t i = 0; i < num; ++i) {
-        message->landmarks[i] = keyframe.landmarks[first + i].value;
-      }
-      emit(*message);
+      for (size_t i = 0; i < num; ++i) message->landmarks[i] = keyframe.landmarks[first + i].value;
       first += num;
-    } while (first < keyframe.features.keypoints.size());
+      // What follows the last keypoints fills their message up.
+      const size_t left = first == num_keypoints ? room - std::min(room, num * kBytesEach) : 0;
+      const size_t at_least = num == 0 ? 1 : 0;
+      const size_t num_shared =
+          std::min(std::max(at_least, left / kBytesPerShared), keyframe.shared.size() - first_shared);
+      FillShared(keyframe, first_shared, num_shared, message);
+      first_shared += num_shared;
+      emit(*message);
+    } while (first < num_keypoints || first_shared < keyframe.shared.size());
   }
 
   static std::string Join(const Message& message, KeyframeObservation* keyframe) {
-    if (message.header.part == 0) {
+    const bool begins = message.header.part == 0, is_last = message.header.part + 1 == message.header.num_parts;
+    if (begins) {
       *keyframe = {};
       keyframe->id.value = message.keyframe;
+      keyframe->reference.value = message.reference;
+      keyframe->num_deltas = message.num_deltas;
     }
     const std::string problem = FirstProblem(
         {Require(message.keyframe >= 0 && message.keyframe == keyframe->id.value, "its keyframe number is out of range"),
+         Require(message.reference >= -1 && message.reference < message.keyframe && message.num_deltas >= 0,
+                 "its reference or its count of deltas is out of range"),
          FromMessage(message.world_from_camera, &keyframe->world_from_camera),
+         FromMessage(message.reference_from_camera, &keyframe->reference_from_camera),
          Require(message.num_landmarks == message.keypoints.num_keypoints, "it has not one landmark for each keypoint"),
-         JoinKeypoints(message.header, message.keypoints, &keyframe->features)});
+         JoinKeypoints(message.keypoints, begins, &keyframe->features),
+         Require(!is_last || HasAllKeypoints(message.keypoints, keyframe->features), kIncomplete)});
     if (!problem.empty()) return problem;
     for (size_t i = 0; i < static_cast<size_t>(message.num_landmarks); ++i) {
       if (message.landmarks[i] < -1) return "a landmark's number is out of range";
       keyframe->landmarks.push_back({message.landmarks[i]});
+    }
+    return JoinShared(message, keyframe);
+  }
+
+ private:
+  static void FillShared(const KeyframeObservation& keyframe, size_t first, size_t num, Message* message) {
+    message->num_shared = static_cast<int32_t>(num);
+    message->shared.resize(num);
+    for (size_t i = 0; i < num; ++i) {
+      const SharedKeypoint& shared = keyframe.shared[first + i];
+      message->shared[i].keypoint = shared.keypoint;
+      message->shared[i].other = shared.other.value;
+      message->shared[i].other_keypoint = shared.other_keypoint;
+      ToMessage(shared.position_in_world, message->shared[i].position_in_world);
+    }
+  }
+  static std::string JoinShared(const Message& message, KeyframeObservation* keyframe) {
+    const auto num_total = static_cast<size_t>(message.keypoints.num_total);
+    for (size_t i = 0; i < static_cast<size_t>(message.num_shared); ++i) {
+      const shared_keypoint_t& shared = message.shared[i];
+      SharedKeypoint& joined = keyframe->shared.emplace_back(
+          SharedKeypoint{shared.keypoint, {shared.other}, shared.other_keypoint, Eigen::Vector3d::Zero()});
+      const bool is_in_range = shared.keypoint >= 0 && static_cast<size_t>(shared.keypoint) < num_total &&
+                               shared.other >= 0 && shared.other < message.keyframe && shared.other_keypoint >= 0 &&
+                               keyframe->shared.size() <= num_total;
+      if (!is_in_range || !FromMessage(shared.position_in_world, &joined.position_in_world)) {
+        return "a shared keypoint is out of range";
+      }
     }
     return "";
   }
@@ -182,6 +151,9 @@ struct Codec<PoseEstimate> {
     message->num_inliers = pose.num_inliers;
     message->num_landmarks = pose.num_landmarks;
     message->is_keyframe = pose.is_keyframe ? 1 : 0;
+    message->num_deltas = pose.num_deltas;
+    message->is_live = pose.is_live ? 1 : 0;
+    message->map_wait_us = pose.map_wait_us;
     emit(*message);
   }
 
@@ -197,14 +169,18 @@ struct Codec<PoseEstimate> {
              .num_matches = message.num_matches,
              .num_inliers = message.num_inliers,
              .num_landmarks = message.num_landmarks,
-             .is_keyframe = message.is_keyframe != 0};
+             .is_keyframe = message.is_keyframe != 0,
+             .num_deltas = message.num_deltas,
+             .is_live = message.is_live != 0,
+             .map_wait_us = message.map_wait_us};
     return FirstProblem(
         {CheckFrame(message.frame), CheckTimes(message.utime, message.arrival),
          Require(message.state >= pose_t::INITIALIZING && message.state <= pose_t::LOST, "its state is none"),
          FromMessage(message.world_from_camera, &pose->world_from_camera),
          FromMessage(message.reference_from_camera, &pose->reference_from_camera),
          Require(message.reference_keyframe >= -1 && message.num_features >= 0 && message.num_matches >= 0 &&
-                     message.num_inliers >= 0 && message.num_landmarks >= 0,
+                     message.num_inliers >= 0 && message.num_landmarks >= 0 && message.num_deltas >= 0 &&
+                     message.map_wait_us >= 0,
                  "one of its counts is negative")});
   }
 };

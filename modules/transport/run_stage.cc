@@ -9,6 +9,7 @@
 #include <atomic>
 #include <climits>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 
@@ -143,8 +144,9 @@ void CompleteRecording(StageContext::Impl& engine) {
   engine.incoming_.AbandonRaw();
 }
 
-// The whole life of the stage. Returns the exit status.
-int Live(const Arguments& arguments, const std::function<std::shared_ptr<void>(StageContext&)>& make_stage) {
+// The whole life of the stage. Returns the exit status, after a sentence if the stage failed.
+int Live(const std::string& program, const Arguments& arguments,
+         const std::function<std::shared_ptr<void>(StageContext&)>& make_stage) {
   CheckCpu();
   StageContext::Impl::Setup setup = MakeSetup(arguments);
   CheckReceiveBuffer(setup.settings);
@@ -167,11 +169,11 @@ int Live(const Arguments& arguments, const std::function<std::shared_ptr<void>(S
     RunFor(engine, two_heartbeats_us);  // last words may have to be repeated
   }
   engine.SendStatus(true);
-  if (engine.exit_status_ == 0) {
-    for (const auto& bus : engine.buses()) bus->Close();
-  } else {
-    throw engine.exit_status_ == 2 ? InputError(engine.failure_) : std::runtime_error(engine.failure_);
+  if (engine.exit_status_ != 0) {
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), engine.failure_.c_str());
+    return engine.exit_status_;
   }
+  for (const auto& bus : engine.buses()) bus->Close();
   return 0;
 }
 
@@ -188,18 +190,16 @@ int RunStageMain(const std::string& stage, const std::string& description, int a
   std::signal(SIGTERM, OnSignal);
   std::signal(SIGINT, OnSignal);
   std::signal(SIGPIPE, SIG_IGN);
-  int exit_status = 1;
-  std::string sentence;
+  const std::string program = "tessera-" + stage;
   try {
-    return Live(arguments, make_stage);
+    return Live(program, arguments, make_stage);
   } catch (const InputError& error) {
-    exit_status = 2;
-    sentence = error.what();
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), error.what());
+    return 2;
   } catch (const std::exception& error) {
-    sentence = error.what();
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), error.what());
+    return 1;
   }
-  std::fprintf(stderr, "tessera-%s: %s\n", stage.c_str(), sentence.c_str());
-  return exit_status;
 }
 
 }  // namespace tessera

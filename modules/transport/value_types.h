@@ -13,5 +13,8 @@
   X(FeatureFrame)                      \
   X(PoseEstimate)                      \
   X(KeyframeObservation)               \
+  X(MapDelta)                          \
+  X(MapRequest)                        \
+  X(MapSnapshotPage)                   \
   X(ExtractorReady)                    \
   X(StageStatus)

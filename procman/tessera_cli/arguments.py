@@ -12,6 +12,8 @@ SOURCE is one of
   video:FILE   any video file that OpenCV reads; needs --camera, or FILE.yaml beside it
   camera:N     V4L2 device /dev/videoN; needs --camera
   rtsp://...   network stream; needs --camera
+  sim:NAME     a made world with exact truth: street, street-short or room; options behind it: sim:street,seed=3,length=500
+               (also speed=, noise=, scale= times the usual, duration= of the room in s, path=FILE of KITTI poses)
   log:FILE     a log recorded by `tessera record`, `tessera run --record` or lcm-logger
   bus:[URL]    frames that another program, such as lcm-logplayer, publishes; default: this stack's main bus
 """
@@ -89,6 +91,8 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pace", type=pace, metavar="lockstep|realtime|X",
                         help="default lockstep for files, realtime for cameras; X is a speed factor")
     parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-<source name>")
+    parser.add_argument("--live", action="store_true",
+                        help="the tracker never waits for the mapper; a recording of such a run is replayed just as it went")
     parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
     add_port(parser)
 
@@ -133,6 +137,13 @@ def add_look_commands(commands) -> None:
     evaluate.add_argument("truth", metavar="GROUND_TRUTH", nargs="?", help="default: the run's own ground_truth.txt")
     evaluate.add_argument("--align", choices=("sim3", "se3"),
                           help="default: se3 for a stereo or RGB-D run, sim3 (with scale) otherwise")
+    keep_map = add_command(
+        commands, "map", "keep_map", "Joins a running stack and writes its map as a cloud of points (PLY).",
+        "Any viewer of point clouds opens the file: MeshLab, CloudCompare, Blender.\n\nexamples:\n"
+        "  procman/tessera map /tmp/now.ply\n  procman/tessera map /tmp/whole.ply --follow\n")
+    keep_map.add_argument("path", metavar="OUT.ply", help="the file to write")
+    keep_map.add_argument("--follow", action="store_true", help="write when the run has ended, not at once")
+    add_port(keep_map)
     experiment = add_command(commands, "experiment", "experiment", "Measurements, as a table, a CSV file and a plot under logs/.",
                              "examples:\n  procman/tessera experiment extraction\n")
     experiment.add_argument("name", metavar="NAME", choices=("extraction",), help="extraction: time per image against cv::ORB")

@@ -27,6 +27,7 @@ class BusListener:
     def __init__(self, url: str, channel_prefix: str, owns_pid: Callable[[int], bool]):
         self.progress = Progress()
         self.foreign = ""  # a living process that was on this bus before us
+        self.others_heard_at = 0.0  # monotonic seconds: the last status of a process that is not ours
         self._began_us = int(time.time() * 1e6)
         self._owns_pid = owns_pid
         self._channel_prefix = channel_prefix
@@ -63,6 +64,8 @@ class BusListener:
         if not STARTING <= message.state <= FAILED:
             return
         report = _to_report(message)
+        if not self._owns_pid(message.pid):
+            self.others_heard_at = time.monotonic()
         if message.host == self._host and self._owns_pid(message.pid):
             self.progress.stages[report.name] = report
             if report.name == "camera" and report.values.get("num_frames", 0) > 0:
@@ -76,7 +79,7 @@ class BusListener:
         except DECODE_ERRORS:
             return
         if message.header.publisher == "tracker" and message.state in TRACKING_STATES:
-            self.progress.add_pose(message.frame, TRACKING_STATES[message.state], message.num_landmarks, message.is_keyframe)
+            self.progress.add_pose(message.frame, TRACKING_STATES[message.state])
 
 
 def _to_report(message: stage_status_t) -> StageReport:

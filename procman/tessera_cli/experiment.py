@@ -74,11 +74,11 @@ def _print_table(rows: list[Row]) -> None:
 
     counters = [counter for counter in COUNTERS if any(counter in row.counters for row in rows)]
     table = Table(title="Time per KITTI image, 2000 keypoints, one thread")
-    table.add_column("what")
+    table.add_column("what", no_wrap=True)
     for heading in ("CPU ms", "x cv::ORB", "x whole", *counters):
         table.add_column(heading, justify="right")
     for row in rows:
-        figures = [f"{row.counters[counter]:g}" if counter in row.counters else "" for counter in counters]
+        figures = [f"{row.counters[counter]:.4g}" if counter in row.counters else "" for counter in counters]
         table.add_row(row.name, f"{row.cpu_ms:.2f}", f"{row.of_reference:.2f}", f"{row.of_whole:.2f}", *figures)
     Console().print(table)
 

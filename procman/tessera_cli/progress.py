@@ -43,20 +43,16 @@ class Progress:
     num_poses: int = 0
     last_frame: int = -1
     tracking_state: str = ""
-    num_keyframes: int = 0
-    num_landmarks: int = 0
     started_at: float = field(default_factory=time.monotonic)
     last_pose_at: float | None = None  # monotonic seconds
     stages: dict[str, StageReport] = field(default_factory=dict)
     _recent: deque = field(default_factory=deque)  # (monotonic seconds, number of poses)
 
-    def add_pose(self, frame: int, state: str, num_landmarks: int, is_keyframe: bool) -> None:
+    def add_pose(self, frame: int, state: str) -> None:
         now = time.monotonic()
         self.num_poses += 1
         self.last_frame = max(self.last_frame, frame)
         self.tracking_state = state
-        self.num_keyframes += is_keyframe
-        self.num_landmarks = num_landmarks
         self.last_pose_at = now
         self._recent.append((now, self.num_poses))
         while self._recent[0][0] < now - RATE_WINDOW_S:
@@ -74,6 +70,18 @@ class Progress:
         if self.num_frames is None or self.frames_per_s <= 0:
             return None
         return max(0, self.num_frames - self.num_poses) / self.frames_per_s
+
+    @property
+    def num_keyframes(self) -> int:
+        """In the map, as the mapper said last."""
+        return self._of_map("keyframes")
+
+    @property
+    def num_landmarks(self) -> int:
+        return self._of_map("landmarks")
+
+    def _of_map(self, name: str) -> int:
+        return int(self.stages["mapper"].values.get(name, 0)) if "mapper" in self.stages else 0
 
     @property
     def num_dropped(self) -> int:

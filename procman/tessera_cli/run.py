@@ -24,7 +24,7 @@ DRAIN_TIMEOUT_S = 3.0
 LISTEN_MS = 50
 # What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
 RUN_FILES = ("summary.json", "run.json", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
-             "keyframes.txt", "ground_truth.txt", "frames.csv", "run.lcmlog", "settings.yaml")
+             "keyframes.txt", "map.ply", "ground_truth.txt", "frames.csv", "run.lcmlog", "settings.yaml")
 
 
 def main(arguments: Namespace) -> int:
@@ -87,7 +87,7 @@ class Launcher:
         """The camera comes last: nobody misses its first frame."""
         if self._source.has_camera_process and not self._bus.is_free():
             raise UserError("another stack runs on this bus: end it, or give --port N to keep the two apart.")
-        for stage in ("evaluator", "tracker", "reassembler", "dispatcher"):
+        for stage in ("evaluator", "mapper", "tracker", "reassembler", "dispatcher"):
             self._stack.start(stage)
         for instance in range(self._arguments.extractors):
             self._stack.start("extractor", instance)

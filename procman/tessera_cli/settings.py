@@ -13,7 +13,8 @@ from tessera_cli.sources import Source
 GROUP = "239.255.76.67"
 FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
 # Keys that the command itself fills in.
-RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE"}
+RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE", "tracker.live": "--live",
+            "tracker.replay_log": "replay LOG"}
 
 
 def bus_url(port: int) -> str:
@@ -21,14 +22,18 @@ def bus_url(port: int) -> str:
     return f"udpm://{GROUP}:{port}?ttl=0"
 
 
+def port_assignments(port: int) -> list[str]:
+    return [f"bus.main_url={bus_url(port)}", f"bus.camera_url={bus_url(port + 1)}", f"bus.work_url={bus_url(port + 2)}",
+            f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}"]
+
+
 def bus_assignments(source: Source, port: int) -> list[str]:
-    main = bus_url(port)
-    camera = bus_url(port + 1)
+    assignments = port_assignments(port)
     if source.kind == "bus":
         # A log player publishes all channels of its log on one bus.
-        main = camera = source.text or main
-    return [f"bus.main_url={main}", f"bus.camera_url={camera}", f"bus.work_url={bus_url(port + 2)}",
-            f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}"]
+        main = source.text or bus_url(port)
+        assignments += [f"bus.main_url={main}", f"bus.camera_url={main}"]
+    return assignments
 
 
 def source_assignments(arguments: Namespace, source: Source) -> list[str]:
@@ -50,6 +55,10 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
         raise UserError("--frames has no effect on bus:, whose frames another program sends.")
     assignments = source_assignments(arguments, source) + bus_assignments(source, arguments.port)
     assignments += [f"camera.pace={pace}", f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
+    if arguments.live:
+        assignments.append("tracker.live=true")
+    if source.kind == "log":
+        assignments.append(f"tracker.replay_log={source.text.removeprefix('log:')}")
     if arguments.record:
         assignments.append(f"recorder.path={out_dir / 'run.lcmlog'}")
     if arguments.features:

@@ -12,7 +12,7 @@ FILES = ("video", "log")
 
 @dataclass(frozen=True)
 class Source:
-    kind: str  # kitti, euroc, tum, video, log, camera, rtsp, bus
+    kind: str  # kitti, euroc, tum, video, log, camera, rtsp, sim, bus
     text: str  # as the camera process takes it, with an absolute path; for bus: the URL, empty for the main bus
     name: str  # short, for the run's folder
 
@@ -39,12 +39,14 @@ def parse_source(text: str) -> Source:
         return Source(kind, text, f"camera-{rest}")
     if kind == "rtsp":
         return Source(kind, text, "rtsp")
+    if kind == "sim":
+        return _simulated_source(rest)
     if kind == "bus":
         if rest and not rest.startswith("udpm://"):
             raise UserError(f"source '{text}': write bus: or bus:udpm://GROUP:PORT?ttl=0.")
         return Source(kind, rest, "bus")
     raise UserError(f"source '{text}' is of no known kind: write kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, "
-                    "rtsp://..., log:FILE or bus:.")
+                    "rtsp://..., sim:NAME, log:FILE or bus:.")
 
 
 def _stored_source(kind: str, rest: str) -> Source:
@@ -57,3 +59,9 @@ def _stored_source(kind: str, rest: str) -> Source:
         raise UserError(f"source '{kind}:{rest}': there is no file {path}.")
     stem = path.stem if kind in FILES else path.name
     return Source(kind, f"{kind}:{path}", f"{kind}-{re.sub(r'[^A-Za-z0-9_.-]+', '_', stem)}")
+
+
+def _simulated_source(rest: str) -> Source:
+    """The camera process checks the options; here only the path of a drive is made absolute."""
+    options = [f"path={Path(option[5:]).expanduser().resolve()}" if option.startswith("path=") else option for option in rest.split(",")]
+    return Source("sim", "sim:" + ",".join(options), f"sim-{options[0]}")

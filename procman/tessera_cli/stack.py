@@ -59,7 +59,8 @@ class Stack:
         if status == 2:
             raise UserError(f"{process.name}: {process.last_words()}")
         if not process.name.startswith("extractor_"):
-            raise RunFailed(f"{process.name} {describe_exit(status)}; the last line of {process.log_path}: {process.last_words()}")
+            lost = ", and the map is gone with it" if process.name == "mapper" else ""
+            raise RunFailed(f"{process.name} {describe_exit(status)}{lost}; the last line of {process.log_path}: {process.last_words()}")
         lived_s = time.monotonic() - process.started_at
         deaths = 1 if lived_s > STABLE_AFTER_S else self._deaths_in_a_row.get(process.name, 0) + 1
         self._deaths_in_a_row[process.name] = deaths

@@ -11,7 +11,7 @@ from tessera_cli.trajectories import TrajectoryError, absolute_error, read_traje
 
 # What the evaluator's run.json hands over as it is.
 EVALUATOR_KEYS = ("frames", "frames_tracked", "frames_lost", "frames_initializing", "frames_dropped", "tracking_failures",
-                  "keyframes", "landmarks", "pose_time_ms", "latency_ms", "stage_ms", "messages_repaired", "messages_lost",
+                  "keyframes", "landmarks", "pose_time_ms", "latency_ms", "map_wait_ms", "stage_ms", "messages_repaired", "messages_lost",
                   "trajectory_sha256", "map_sha256")
 
 
@@ -101,6 +101,8 @@ def in_words(summary: dict, folder: Path) -> str:
     else:
         lines.append(f"error: {summary['alignment']}")
     lines.append(f"{_statistics('pose time', summary['pose_time_ms'])}; {_statistics('latency', summary['latency_ms'])}")
+    if wait := summary["map_wait_ms"]:
+        lines.append(f"the tracker waited for the mapper {wait['mean']:.1f} ms a frame, 95 % {wait['p95']:.1f} ms")
     lines.append(f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
                  f"{summary['messages_undecodable']} undecodable; extractors started again: {summary['extractor_restarts']}")
     lines += [f"warning: {warning}" for warning in summary["warnings"]]

@@ -8,6 +8,7 @@
 #include "features/feature_images.h"
 #include "features/selection.h"
 #include "features/tiling.h"
+#include "features/warped_pairs.h"
 
 namespace tessera {
 namespace {
@@ -37,6 +38,21 @@ std::vector<std::vector<TileJob>> Cut(SensorType sensor, TileGrid grid, int coar
   return jobs;
 }
 
+// Mean share of keypoints that are found again within 2 px, over the motions of a few of the images.
+template <class Extract>
+double MeanRepeatability(Extract extract) {
+  constexpr size_t kStep = 4;  // a quarter of the images is enough
+  double sum = 0.0;
+  int num_pairs = 0;
+  for (size_t i = 0; i < kNumImages; i += kStep) {
+    for (const WarpedPair& pair : MakeWarpedPairs(Images()[i])) {
+      sum += Repeatability(pair, extract(pair.first, FeatureOptions{}), extract(pair.second, FeatureOptions{}));
+      ++num_pairs;
+    }
+  }
+  return sum / num_pairs;
+}
+
 void CvOrb(benchmark::State& state) {
   cv::setNumThreads(1);
   const cv::Ptr<cv::ORB> orb = cv::ORB::create(FeatureOptions{}.num_features);
@@ -50,6 +66,8 @@ void CvOrb(benchmark::State& state) {
     benchmark::DoNotOptimize(descriptors.data);
   }
   state.counters["keypoints"] = static_cast<double>(keypoints.size());
+  static const double repeatability = MeanRepeatability(ExtractCvOrb);
+  state.counters["repeatability"] = repeatability;
 }
 
 // Extraction of all jobs of an image by one extractor, and selection.
@@ -76,6 +94,10 @@ void Extraction(benchmark::State& state, SensorType sensor, TileGrid grid, int c
   state.counters["keypoints"] = static_cast<double>(frame.keypoints.size());
   state.counters["candidates"] = static_cast<double>(num_candidates);
   state.counters["wire_kB"] = static_cast<double>(bytes) / 1000.0;
+  if (sensor != SensorType::kMono) return;
+  // Of the whole image: that the cut changes nothing is what the tests of losslessness show.
+  static const double repeatability = MeanRepeatability(ExtractTessera);
+  state.counters["repeatability"] = repeatability;
 }
 
 // What the dispatcher does.

@@ -47,14 +47,23 @@ class RunFilesTest : public testing::Test {
       pose.num_inliers = 40;
       pose.num_landmarks = 900;
       pose.is_keyframe = i == 1;
+      pose.num_deltas = i / 2;
+      pose.map_wait_us = i / 2 * 6000;
       record.AddPose(pose, 1'010'000 + 4'000 * i);
       record.AddGroundTruth({pose.frame, pose.utime_us, {}});
     }
-    KeyframeObservation keyframe;
-    keyframe.id = KeyframeId{0};
-    keyframe.features.frame = FrameId{1};
-    keyframe.features.utime_us = 1'403'636'584'763'556;
-    record.AddKeyframe(keyframe);
+    auto features = std::make_shared<FeatureFrame>();
+    features->frame = FrameId{1};
+    features->utime_us = 1'403'636'584'763'556;
+    features->keypoints.resize(1);
+    features->descriptors.resize(1);
+    MapDelta delta{.new_keyframes = {{{0}, {}, {}, features}},
+                   .changed_landmarks = {{{4}, {.position_in_world = {1.5, -2.0, 30.0}, .normal = {0.0, 0.0, -1.0}}}},
+                   .new_observations = {{{4}, {{0}, 0}}}};
+    Map trial;
+    (void)trial.Apply(delta);
+    delta.hash = trial.hash();
+    EXPECT_EQ(record.ApplyDelta(delta), "");
     record.SetStage("tracker", {.step_ms = {3, 2.0, 1.5, 4.0, 5.0, 6.0}, .num_repaired = 2, .num_lost = 1});
     record.SetStage("extractor_0", {.num_repaired = 5});
     record.SetEnd(3, 0);
@@ -98,7 +107,7 @@ TEST_F(RunFilesTest, WritesAllFilesAndLeavesNothingBeside) {
   }
   std::sort(names.begin(), names.end());
   EXPECT_EQ(names,
-            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "run.json",
+            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "map.ply", "run.json",
                                       "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
 }
 
@@ -116,10 +125,11 @@ TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {
 
 TEST_F(RunFilesTest, FramesCsvHasARowPerFrame) {
   EXPECT_EQ(FramesCsv(SmallRun()),
-            "frame,utime_us,state,pose_time_ms,latency_ms,features,matches,inliers,landmarks,is_keyframe\n"
-            "0,1403636584763555,initializing,,10.000,2000,50,40,900,0\n"
-            "1,1403636584763556,tracked,4.000,14.000,2000,50,40,900,1\n"
-            "2,1403636584763557,lost,4.000,18.000,2000,50,40,900,0\n");
+            "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,"
+            "num_deltas\n"
+            "0,1403636584763555,initializing,,10.000,0.000,2000,50,40,900,0,0\n"
+            "1,1403636584763556,tracked,4.000,14.000,0.000,2000,50,40,900,1,0\n"
+            "2,1403636584763557,lost,4.000,18.000,6.000,2000,50,40,900,0,1\n");
 }
 
 TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
@@ -132,7 +142,8 @@ TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
   EXPECT_EQ(json["frames_dropped"], 0);
   EXPECT_EQ(json["tracking_failures"], 1);
   EXPECT_EQ(json["keyframes"], 1);
-  EXPECT_EQ(json["landmarks"], 900);
+  EXPECT_EQ(json["landmarks"], 1);
+  EXPECT_DOUBLE_EQ(json["map_wait_ms"]["mean"], 2.0);
   EXPECT_DOUBLE_EQ(json["pose_time_ms"]["median"], 4.0);
   EXPECT_DOUBLE_EQ(json["latency_ms"]["max"], 18.0);
   EXPECT_EQ(json["stage_ms"]["tracker"]["p95"], 4.0);
@@ -140,7 +151,15 @@ TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
   EXPECT_EQ(json["messages_repaired"], 7);
   EXPECT_EQ(json["messages_lost"], 1);
   EXPECT_EQ(json["trajectory_sha256"], record.TrajectorySha256());
-  EXPECT_EQ(json["map_sha256"], record.MapSha256());
+  EXPECT_EQ(json["map_sha256"], record.map().Sha256Hex());
+}
+
+TEST_F(RunFilesTest, TheMapIsACloudOfItsLandmarks) {
+  WriteRun(SmallRun(), folder_);
+  const std::string text = Read("map.ply");
+  EXPECT_EQ(text.substr(0, 4), "ply\n");
+  EXPECT_NE(text.find("element vertex 1\n"), std::string::npos);
+  EXPECT_EQ(text.substr(text.find("end_header\n")), "end_header\n1.5 -2 30 0.0000 0.0000 -1.0000 1\n");
 }
 
 TEST_F(RunFilesTest, AnEmptyRunHasFilesToo) {

@@ -10,6 +10,7 @@
 #include "features/feature_images.h"
 #include "features/pattern.h"
 #include "features/pyramid.h"
+#include "features/smoother.h"
 #include "features/tile_plan.h"
 
 namespace tessera {
@@ -62,16 +63,24 @@ int ScoreSlowly(const GrayImage& image, int x, int y) {
   return score;
 }
 
-int SmoothSlowly(const GrayImage& image, int x, int y) {
-  const auto smooth3 = [](auto value, int at, int step) {
-    const int sides = (value(at - step) + value(at + step) + 1) / 2;
-    return (sides + value(at) + 1) / 2;
-  };
-  const auto along_y = [&](int column) {
-    const auto pixel = [&](int row) -> int { return image.row(row)[column]; };
-    return smooth3([&](int row) { return smooth3(pixel, row, 1); }, y, 2);
-  };
-  return smooth3([&](int column) { return smooth3(along_y, column, 1); }, x, 2);
+// Averages of three pixels that are `step` apart, along y, then along x; every average of two is rounded up.
+GrayImage SmoothSlowly(const GrayImage& image, int step) {
+  const auto smooth3 = [](int before, int centre, int after) { return ((before + after + 1) / 2 + centre + 1) / 2; };
+  GrayImage along_y(image.width, image.height);
+  for (int y = step; y < image.height - step; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      along_y.row(y)[x] =
+          static_cast<uint8_t>(smooth3(image.row(y - step)[x], image.row(y)[x], image.row(y + step)[x]));
+    }
+  }
+  GrayImage smoothed(image.width, image.height);
+  for (int y = step; y < image.height - step; ++y) {
+    const uint8_t* row = along_y.row(y);
+    for (int x = step; x < image.width - step; ++x) {
+      smoothed.row(y)[x] = static_cast<uint8_t>(smooth3(row[x - step], row[x], row[x + step]));
+    }
+  }
+  return smoothed;
 }
 
 TEST(Pyramid, LevelsAreAsDefined) {
@@ -137,13 +146,14 @@ TEST(Pyramid, PositionsFollowTheScale) {
 
 TEST(Smoother, AveragesAsDefined) {
   const GrayImage image = MakeNoise(117, 64, 4);
-  const LevelImage level = LevelZero(image);
-  Smoother smoother;
-  const Rect region{.x = 3, .y = 3, .width = 110, .height = 58};
-  LevelImage out;
-  smoother.Smooth(level, region, out);
-  for (int y = region.y; y < region.bottom(); ++y) {
-    for (int x = region.x; x < region.right(); ++x) ASSERT_EQ(*out.At(x, y), SmoothSlowly(image, x, y));
+  for (const int step : {1, 2, 3}) {
+    const GrayImage expected = SmoothSlowly(image, step);
+    const Rect region{.x = 3, .y = 3, .width = 110, .height = 58};
+    LevelImage out;
+    Smoother().Smooth(LevelZero(image), region, step, out);
+    for (int y = region.y; y < region.bottom(); ++y) {
+      for (int x = region.x; x < region.right(); ++x) ASSERT_EQ(*out.At(x, y), expected.row(y)[x]) << step;
+    }
   }
 }
 
@@ -172,7 +182,18 @@ std::vector<Candidate> DetectSlowly(const GrayImage& image, int min_score, int c
       for (int y = cell_y; y < std::min(cell_y + kCellPx, image.height - kBorderPx); ++y) {
         for (int x = cell_x; x < std::min(cell_x + kCellPx, image.width - kBorderPx); ++x) {
           if (scores.row(y)[x] < min_score || !is_maximum(x, y)) continue;
-          cell.push_back({.x = static_cast<int16_t>(x), .y = static_cast<int16_t>(y), .score = scores.row(y)[x]});
+          const auto offset = [&](int step_x, int step_y) {
+            const int before = std::max<int>(scores.row(y - step_y)[x - step_x], min_score - 1);
+            const int after = std::max<int>(scores.row(y + step_y)[x + step_x], min_score - 1);
+            const int curvature = 2 * scores.row(y)[x] - before - after;
+            if (curvature == 0) return int8_t{0};
+            return static_cast<int8_t>(std::lround(kCornerSubpixels * 0.5 * (after - before) / curvature));
+          };
+          cell.push_back({.x = static_cast<int16_t>(x),
+                          .y = static_cast<int16_t>(y),
+                          .offset_x = offset(1, 0),
+                          .offset_y = offset(0, 1),
+                          .score = scores.row(y)[x]});
         }
       }
       std::stable_sort(cell.begin(), cell.end(), [](const auto& a, const auto& b) { return a.score > b.score; });

@@ -155,6 +155,8 @@ TEST(CheckTileFeatures, RefusesHostileValues) {
       [](TileFeatures& f) { f.candidates[0].x = -7; },
       [](TileFeatures& f) { f.candidates[0].x = 640; },
       [](TileFeatures& f) { f.candidates[0].y = 479; },
+      [](TileFeatures& f) { f.candidates[0].offset_x = -33; },
+      [](TileFeatures& f) { f.candidates[0].offset_y = 127; },
       [](TileFeatures& f) { f.candidates[0].right_x_px = std::numeric_limits<float>::infinity(); },
       [](TileFeatures& f) { f.candidates[0].right_x_px = 640.0F; },
       [](TileFeatures& f) { f.candidates[0].depth_m = std::numeric_limits<float>::quiet_NaN(); },

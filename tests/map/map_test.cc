@@ -4,60 +4,10 @@
 
 #include <random>
 
+#include "map/random_changes.h"
+
 namespace tessera {
 namespace {
-
-constexpr int kKeypoints = 40;
-
-std::shared_ptr<const FeatureFrame> Features(int64_t frame) {
-  auto features = std::make_shared<FeatureFrame>();
-  features->frame = {frame};
-  features->keypoints.resize(kKeypoints);
-  features->descriptors.resize(kKeypoints);
-  return features;
-}
-
-Landmark RandomLandmark(std::mt19937& generator) {
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  Landmark landmark;
-  landmark.position_in_world = {uniform(generator), uniform(generator), uniform(generator)};
-  landmark.descriptor = {generator(), generator(), generator(), generator()};
-  return landmark;
-}
-
-// Random but valid changes to `map`, as a mapper would make them: the delta, with the hash it leads to, applied.
-MapDelta RandomChange(Map& map, std::mt19937& generator) {
-  MapDelta delta;
-  delta.number = map.next_delta();
-  const KeyframeId keyframe{map.keyframes().end_id()};
-  delta.answers = keyframe;
-  delta.new_keyframes.push_back({keyframe, {keyframe.value - 1}, {}, Features(3 * keyframe.value)});
-  int32_t keypoint = 0;
-  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
-    if (keypoint < kKeypoints / 2 && generator() % 2 == 0) {
-      delta.new_observations.push_back({id, {keyframe, keypoint++}});
-    } else if (generator() % 10 == 0) {
-      for (const Observation& observation : map.ObservationsOf(id)) {
-        delta.removed_observations.push_back({id, observation});
-      }
-      delta.removed_landmarks.push_back(id);
-    }
-  });
-  for (int i = 0; i < 10; ++i) {
-    const LandmarkId id{map.landmarks().end_id() + i};
-    delta.changed_landmarks.push_back({id, RandomLandmark(generator)});
-    delta.new_observations.push_back({id, {keyframe, keypoint++}});
-  }
-  if (keyframe.value > 0) {
-    delta.moved_keyframes.push_back({{keyframe.value - 1}, {Eigen::Quaterniond::Identity(), {static_cast<double>(generator() % 100), 0, 0}}});
-  }
-  // The hash is found by trying on a copy, whose complaint about the missing hash is expected.
-  Map trial = map;
-  EXPECT_NE(trial.Apply(delta).find("wrong hash"), std::string::npos);
-  delta.hash = trial.hash();
-  EXPECT_EQ(map.Apply(delta), "");
-  return delta;
-}
 
 TEST(Map, ReplicasOfTheSameDeltasAreEqualAndASnapshotLeadsToTheSame) {
   std::mt19937 generator(1);
@@ -92,10 +42,30 @@ TEST(Map, TheStateDoesNotDependOnHowChangesAreSplit) {
     for (const auto& x : delta.changed_landmarks) apply_one({.changed_landmarks = {x}});
     for (const auto& x : delta.removed_observations) apply_one({.removed_observations = {x}});
     for (const auto& x : delta.new_observations) apply_one({.new_observations = {x}});
+    for (const auto& x : delta.changed_parents) apply_one({.changed_parents = {x}});
     for (const auto& x : delta.removed_landmarks) apply_one({.removed_landmarks = {x}});
+    for (const auto& x : delta.removed_keyframes) apply_one({.removed_keyframes = {x}});
   }
   EXPECT_EQ(split.hash(), owner.hash());
   EXPECT_EQ(split.Sha256Hex(), owner.Sha256Hex());
+}
+
+TEST(Map, TheHashCoversEveryKeypoint) {
+  std::mt19937 generator(5);
+  Map map;
+  MapDelta delta = RandomChange(map, generator);
+  auto features = std::make_shared<FeatureFrame>(*delta.new_keyframes[0].features);
+  features->keypoints.back().angle ^= 1;
+  delta.new_keyframes[0].features = features;
+  Map other;
+  EXPECT_NE(other.Apply(delta).find("wrong hash"), std::string::npos);
+  EXPECT_NE(other.Sha256Hex(), map.Sha256Hex());
+}
+
+TEST(Map, RefusesIdsThatLeapAhead) {
+  MapDelta delta;
+  delta.changed_landmarks.push_back({{int64_t{1} << 40}, {}});
+  EXPECT_NE(Map().Apply(delta).find("can't be added"), std::string::npos);
 }
 
 TEST(Map, CovisibilityCountsSharedLandmarks) {
@@ -128,7 +98,7 @@ TEST(Map, SaysWhatIsWrongWithADelta) {
   wrong.moved_keyframes.push_back({{99}, {}});
   EXPECT_NE(Map(map).Apply(wrong).find("keyframe 99"), std::string::npos);
   wrong.moved_keyframes.clear();
-  wrong.new_observations.push_back({{0}, {{0}, kKeypoints}});
+  wrong.new_observations.push_back({{0}, {{0}, kKeypointsPerKeyframe}});
   EXPECT_NE(Map(map).Apply(wrong).find("can't observe"), std::string::npos);
   wrong.new_observations.clear();
   wrong.removed_landmarks.push_back({0});

@@ -35,6 +35,7 @@ def must_refuse(finished, *words: str) -> None:
     (["record", "kitti:/no/such/folder", "out.lcmlog"], "/no/such/folder"),
     (["evaluate", "/no/such/file", "/no/such/truth"], "/no/such"),
     (["experiment", "everything"], "extraction"),
+    (["map", "/no/such/folder/map.ply"], "/no/such/folder"),
 ])
 def test_arguments_at_fault(tessera, arguments, word):
     must_refuse(tessera.command(*arguments), word)
@@ -45,6 +46,9 @@ def test_arguments_at_fault(tessera, arguments, word):
     ("features.num_features=many", "features.num_features"),
     ("evaluator.out_dir=/tmp", "--out"),
     ("camera.source=kitti:/tmp", "SOURCE"),
+    ("tracker.live=true", "--live"),
+    ("tracker.map_delay_frames=0", "map_delay_frames"),
+    ("mapper.bundle_iterations=0", "mapper"),
 ])
 def test_settings_at_fault(tessera, sequence, setting, word):
     must_refuse(tessera.run(f"kitti:{sequence}", "--set", setting), word)

@@ -20,7 +20,7 @@ MAX_RMS_ERROR_M = 0.05
 SUMMARY_KEYS = {
     "source", "sensor", "extractors", "tiles", "frames", "frames_tracked", "frames_lost", "frames_dropped", "tracking_failures",
     "relocalizations", "keyframes", "landmarks", "loops_closed", "rms_error_m", "alignment", "wall_s", "frames_per_s", "pose_time_ms",
-    "latency_ms", "stage_ms", "cpu_s", "max_rss_mb", "messages_repaired", "messages_lost", "trajectory_sha256", "map_sha256"}
+    "latency_ms", "map_wait_ms", "stage_ms", "cpu_s", "max_rss_mb", "messages_repaired", "messages_lost", "trajectory_sha256", "map_sha256"}
 LOGPLAYER = ROOT / ".venv" / "bin" / "lcm-logplayer"
 
 
@@ -58,16 +58,22 @@ def test_a_run_ends_well(reference_run):
     assert summary["frames_tracked"] > 0.8 * NUM_FRAMES
     assert summary["rms_error_m"] < MAX_RMS_ERROR_M
     assert summary["messages_lost"] == 0
-    for name in ("camera", "dispatcher", "extractor_0", "reassembler", "tracker", "evaluator"):
+    assert summary["keyframes"] >= 2 and summary["landmarks"] > 100
+    assert summary["map_wait_ms"]["max"] >= 0
+    for name in ("extractor_0", "reassembler", "tracker", "mapper"):
+        assert summary["stage_ms"][name]["median"] > 0
+    for name in ("camera", "dispatcher", "extractor_0", "reassembler", "tracker", "mapper", "evaluator"):
         assert summary["cpu_s"][name] > 0 and summary["max_rss_mb"][name] > 0
 
 
 def test_a_run_leaves_its_files(reference_run):
     files = {path.name for path in reference_run.folder.iterdir()}
-    assert files >= {"trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt", "keyframes.txt", "summary.json", "trajectory.png",
-                     "settings.yaml", "stages"}
+    assert files >= {"trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt", "keyframes.txt", "map.ply", "summary.json",
+                     "trajectory.png", "settings.yaml", "stages"}
     assert not [name for name in files if "unfinished" in name]
     assert len((reference_run.folder / "trajectory_kitti.txt").read_text().splitlines()) == NUM_FRAMES
+    assert f"element vertex {reference_run.summary['landmarks']}\n" in (reference_run.folder / "map.ply").read_text()
+    assert (reference_run.folder / "trajectory.txt").read_text() != (reference_run.folder / "trajectory_live.txt").read_text()
 
 
 def test_evaluate_repeats_the_error_of_the_run(tessera, reference_run):
@@ -95,15 +101,66 @@ def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, referenc
     assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
 
 
-def test_another_stage_that_is_killed_ends_the_run(tessera, sequence):
+@pytest.mark.parametrize("stage", ["reassembler", "mapper"])
+def test_another_stage_that_is_killed_ends_the_run(tessera, sequence, stage):
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
-    os.kill(pids_of(folder, "reassembler")[0], signal.SIGKILL)
+    os.kill(pids_of(folder, stage)[0], signal.SIGKILL)
     out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
     assert run.returncode == 1, out
-    assert "reassembler was killed by SIGKILL" in out
+    assert f"{stage} was killed by SIGKILL" in out
     assert not pids_of(folder)
+
+
+def test_a_mapper_of_lowest_priority_changes_nothing(tessera, sequence, reference_run):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "mapper"), "the mapper")
+    os.setpriority(os.PRIO_PROCESS, pids_of(folder, "mapper")[0], 19)
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 0, out
+    summary = json.loads((folder / "summary.json").read_text())
+    for key in ("trajectory_sha256", "map_sha256"):
+        assert summary[key] == reference_run.summary[key], key
+
+
+def test_the_map_of_a_running_stack_is_the_mappers(tessera, sequence, reference_run, tmp_path):
+    """A listener that joins in the middle reaches the hash of the owner, and says it."""
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.2", "--port", port, "--out", folder)
+    poses = []
+    bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
+    bus.subscribe("POSE", lambda _channel, data: poses.append(data)).set_queue_capacity(1000)
+    wait_for(lambda: (bus.handle_timeout(20), len(poses) > NUM_FRAMES // 4)[1], "poses")
+    followed = tessera.start("map", tmp_path / "whole.ply", "--follow", "--port", port)
+    now = tessera.command("map", tmp_path / "now.ply", "--port", port).must_end_well()
+    assert "as the mapper's" in now.out
+    assert (tmp_path / "now.ply").read_text().startswith("ply\n")
+    out, _ = followed.communicate(timeout=RUN_TIMEOUT_S)
+    assert followed.returncode == 0, out
+    run_out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    assert run.returncode == 0, run_out
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["map_sha256"] == reference_run.summary["map_sha256"]
+    assert summary["map_sha256"] in out
+    assert (tmp_path / "whole.ply").read_text() == (folder / "map.ply").read_text()
+
+
+def test_map_without_a_stack_is_refused(tessera, tmp_path):
+    finished = tessera.command("map", tmp_path / "none.ply", "--port", tessera.next_port())
+    assert finished.status == 2, finished.out + finished.err
+    assert "--port" in finished.err and finished.err.count("\n") == 1
+
+
+def test_a_live_run_is_replayed_as_it_went(tessera, sequence):
+    """Nobody waits for the mapper, and frames drop: what came of that depends on the machine, but can be repeated."""
+    settings = ("--set", "dispatcher.max_queued_frames=1", "--set", "dispatcher.max_frames_in_flight=1")
+    live = tessera.run(f"kitti:{sequence}", "--live", "--record", "--pace", "3", *settings).must_end_well()
+    replayed = tessera.run(live.folder / "run.lcmlog", "--extractors", 1, "--tiles", "2x2", command="replay").must_end_well()
+    for key in ("frames_tracked", "frames_lost", "keyframes", "landmarks", "trajectory_sha256", "map_sha256"):
+        assert replayed.summary[key] == live.summary[key], key
+    assert (replayed.folder / "trajectory_live.txt").read_text() == (live.folder / "trajectory_live.txt").read_text()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -179,7 +236,7 @@ def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path):
 def publish_noise(port: int, generator: random.Random) -> None:
     """A hundred messages of random bytes on every channel of every bus, and datagrams that are no LCM at all."""
     channels = ("CAMERA", "CALIBRATION", "GROUND_TRUTH", "END_OF_STREAM", "EXTRACTOR_READY", "TILE_ACK", "TILE_FEATURES", "FEATURES", "POSE",
-                "KEYFRAME", "STATUS", "HEARTBEAT", "REPAIR", "TILE_0", "TILE_1", "UNKNOWN")
+                "KEYFRAME", "MAP_DELTA", "MAP_SNAPSHOT", "MAP_REQUEST", "STATUS", "HEARTBEAT", "REPAIR", "TILE_0", "TILE_1", "UNKNOWN")
     buses = [lcm.LCM(f"udpm://239.255.76.67:{port + offset}?ttl=0") for offset in (0, 1, 2, 13, 14)]
     raw = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for _ in range(100):

@@ -70,6 +70,7 @@ TEST(Codec, LargeValuesAreCut) {
   std::mt19937 generator(2);
   EXPECT_GT(Encode(DrawValue<CameraFrame>(generator, 1), 1380).size(), 10U);
   EXPECT_GT(Encode(DrawValue<FeatureFrame>(generator, 1), 1380).size(), 2U);
+  EXPECT_GT(Encode(DrawValue<MapDelta>(generator, 1), 1380).size(), 10U);
   EXPECT_EQ(Encode(DrawValue<PoseEstimate>(generator, 1), 1380).size(), 1U);
 }
 
@@ -172,6 +173,33 @@ TEST(Codec, FeaturesOutOfRangeAreRefused) {
   ExpectRefused<StageStatus>([](StageStatus& status) { status.num_lost = -1; });
 }
 
+TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.reference = keyframe.id; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].other = keyframe.id; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].keypoint = 1 << 19; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].position_in_world.x() = kNan; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.number = -1; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.new_keyframes[1].id.value = -1; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.moved_keyframes[0].world_from_camera.translation.x() = kNan; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.normal.y() = INFINITY; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.max_distance = kNan; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.new_observations[0].observation.keypoint = -1; });
+  ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.page = page.num_pages; });
+  ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.part.removed_keyframes.push_back({1}); });
+  ExpectRefused<MapRequest>([](MapRequest& request) { request.page = -1; });
+}
+
+// A keyframe must not go on in a message of another one.
+TEST(Codec, KeyframesOfTheMapAreWhole) {
+  std::mt19937 generator(6);
+  const MapDelta delta = DrawValue<MapDelta>(generator, 1);
+  std::vector<Bytes> messages = Encode(delta, 10000);
+  ASSERT_GT(messages.size(), 10U);
+  MapDelta decoded;
+  std::swap(messages[1], messages[2]);
+  EXPECT_NE(Decode(messages, &decoded), "");
+}
+
 TEST(Codec, HeadersOutOfRangeAreRefused) {
   const auto is_refused = [](void (*change)(MessageHeader& header)) {
     MessageHeader header = ExampleHeader();
@@ -183,7 +211,7 @@ TEST(Codec, HeadersOutOfRangeAreRefused) {
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.publisher = std::string(64, 'a'); }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.epoch_us = 0; }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.sequence = -1; }));
-  EXPECT_TRUE(is_refused([](MessageHeader& header) { header.sequence = INT64_MAX; }));
+  EXPECT_TRUE(is_refused([](MessageHeader& header) { header.sequence = int64_t{1} << 60; }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.publish_us = INT64_MIN; }));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.num_parts = 0; }));
 }

@@ -1,6 +1,8 @@
 #include "transport/example_values.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 namespace tessera {
 namespace {
@@ -143,6 +145,8 @@ TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   for (int i = 0; i < num_candidates; ++i) {
     features.candidates.push_back({.x = static_cast<int16_t>(Draw(generator, 0, 639)),
                                    .y = static_cast<int16_t>(Draw(generator, 0, 479)),
+                                   .offset_x = static_cast<int8_t>(Draw(generator, -32, 32)),
+                                   .offset_y = static_cast<int8_t>(Draw(generator, -32, 32)),
                                    .level = static_cast<uint8_t>(Draw(generator, 0, 7)),
                                    .angle = static_cast<uint8_t>(generator()),
                                    .score = static_cast<uint16_t>(generator()),
@@ -205,18 +209,120 @@ bool AreSame(const FeatureFrame& a, const FeatureFrame& b) {
 
 template <>
 KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int size) {
-  KeyframeObservation keyframe{.id = {Draw(generator, 0, 99)},
+  const int id = Draw(generator, 10, 99);
+  KeyframeObservation keyframe{.id = {id},
                                .features = DrawValue<FeatureFrame>(generator, size),
-                               .world_from_camera = DrawPose(generator)};
+                               .world_from_camera = DrawPose(generator),
+                               .landmarks = {},
+                               .reference = {Draw(generator, -1, id - 1)},
+                               .reference_from_camera = DrawPose(generator),
+                               .shared = {},
+                               .num_deltas = Draw(generator, 0, 99)};
   for (size_t i = 0; i < keyframe.features.keypoints.size(); ++i) {
     keyframe.landmarks.push_back({Draw(generator, -1, 9999)});
+    if (generator() % 3 == 0) continue;
+    keyframe.shared.push_back(
+        {static_cast<int32_t>(i), {Draw(generator, 0, id - 1)}, Draw(generator, 0, 999), DrawPose(generator).translation});
   }
   return keyframe;
 }
 template <>
 bool AreSame(const KeyframeObservation& a, const KeyframeObservation& b) {
+  const auto is_same = [](const SharedKeypoint& x, const SharedKeypoint& y) {
+    return x.keypoint == y.keypoint && x.other == y.other && x.other_keypoint == y.other_keypoint &&
+           x.position_in_world == y.position_in_world;
+  };
   return a.id == b.id && AreSame(a.features, b.features) && AreSamePose(a.world_from_camera, b.world_from_camera) &&
-         a.landmarks == b.landmarks;
+         a.landmarks == b.landmarks && a.reference == b.reference &&
+         AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_deltas == b.num_deltas &&
+         std::equal(a.shared.begin(), a.shared.end(), b.shared.begin(), b.shared.end(), is_same);
+}
+
+namespace {
+
+Landmark DrawLandmark(std::mt19937& generator) {
+  return {.position_in_world = DrawPose(generator).translation,
+          .normal = DrawPose(generator).translation.normalized(),
+          .min_distance = DrawReal(generator, 0, 9),
+          .max_distance = DrawReal(generator, 9, 99),
+          .descriptor = DrawDescriptor(generator)};
+}
+
+// Keyframes, landmarks and observations: what a snapshot is made of.
+MapDelta DrawContent(std::mt19937& generator, int size) {
+  MapDelta delta{.number = Draw(generator, 0, 99), .answers = {Draw(generator, -1, 99)}, .hash = generator()};
+  for (int i = 0; i < 3 * size; ++i) {
+    auto features = std::make_shared<FeatureFrame>(DrawValue<FeatureFrame>(generator, i % 2));
+    delta.new_keyframes.push_back({{i}, {Draw(generator, -1, 9)}, DrawPose(generator), std::move(features)});
+  }
+  const int num_landmarks = size * Draw(generator, 1, 2000);
+  for (int i = 0; i < num_landmarks; ++i) {
+    delta.changed_landmarks.push_back({{Draw(generator, 0, 9999)}, DrawLandmark(generator)});
+    delta.new_observations.push_back({{Draw(generator, 0, 99)}, {{Draw(generator, 0, 99)}, Draw(generator, 0, 99)}});
+  }
+  return delta;
+}
+
+bool AreSameKeyframe(const MapDelta::NewKeyframe& a, const MapDelta::NewKeyframe& b) {
+  return a.id == b.id && a.parent == b.parent && AreSamePose(a.world_from_camera, b.world_from_camera) &&
+         AreSame(*a.features, *b.features);
+}
+
+template <class Item, class IsSame>
+bool AreSameLists(const std::vector<Item>& a, const std::vector<Item>& b, IsSame is_same) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), is_same);
+}
+
+}  // namespace
+
+template <>
+MapDelta DrawValue<MapDelta>(std::mt19937& generator, int size) {
+  MapDelta delta = DrawContent(generator, size);
+  for (int i = 0; i < 20 * size; ++i) {
+    delta.moved_keyframes.push_back({{Draw(generator, 0, 99)}, DrawPose(generator)});
+    delta.changed_parents.push_back({{Draw(generator, 0, 99)}, {Draw(generator, -1, 99)}});
+    delta.removed_keyframes.push_back({Draw(generator, 0, 99)});
+  }
+  for (int i = 0; i < 500 * size; ++i) {
+    delta.removed_observations.push_back({{Draw(generator, 0, 99)}, {{Draw(generator, 0, 99)}, Draw(generator, 0, 99)}});
+    delta.removed_landmarks.push_back({Draw(generator, 0, 99)});
+  }
+  return delta;
+}
+template <>
+bool AreSame(const MapDelta& a, const MapDelta& b) {
+  return a.number == b.number && a.answers == b.answers && a.is_snapshot == b.is_snapshot && a.hash == b.hash &&
+         AreSameLists(a.new_keyframes, b.new_keyframes, AreSameKeyframe) &&
+         AreSameLists(a.moved_keyframes, b.moved_keyframes,
+                      [](const auto& x, const auto& y) {
+                        return x.id == y.id && AreSamePose(x.world_from_camera, y.world_from_camera);
+                      }) &&
+         AreSameLists(a.changed_landmarks, b.changed_landmarks,
+                      [](const auto& x, const auto& y) { return x.id == y.id && x.landmark == y.landmark; }) &&
+         a.removed_observations == b.removed_observations && a.new_observations == b.new_observations &&
+         AreSameLists(a.changed_parents, b.changed_parents,
+                      [](const auto& x, const auto& y) { return x.id == y.id && x.parent == y.parent; }) &&
+         a.removed_landmarks == b.removed_landmarks && a.removed_keyframes == b.removed_keyframes;
+}
+
+template <>
+MapSnapshotPage DrawValue<MapSnapshotPage>(std::mt19937& generator, int size) {
+  MapSnapshotPage page{.page = Draw(generator, 0, 9), .num_pages = 10, .part = DrawContent(generator, size)};
+  page.part.is_snapshot = true;
+  return page;
+}
+template <>
+bool AreSame(const MapSnapshotPage& a, const MapSnapshotPage& b) {
+  return a.page == b.page && a.num_pages == b.num_pages && AreSame(a.part, b.part);
+}
+
+template <>
+MapRequest DrawValue<MapRequest>(std::mt19937& generator, int) {
+  return {.next_delta = Draw(generator, -1, 99), .snapshot = Draw(generator, -1, 99), .page = Draw(generator, 0, 99)};
+}
+template <>
+bool AreSame(const MapRequest& a, const MapRequest& b) {
+  return a == b;
 }
 
 template <>
@@ -232,7 +338,10 @@ PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
           .num_matches = Draw(generator, 0, 2000),
           .num_inliers = Draw(generator, 0, 2000),
           .num_landmarks = Draw(generator, 0, 2000),
-          .is_keyframe = Draw(generator, 0, 1) == 1};
+          .is_keyframe = Draw(generator, 0, 1) == 1,
+          .num_deltas = Draw(generator, 0, 99),
+          .is_live = Draw(generator, 0, 1) == 1,
+          .map_wait_us = Draw(generator, 0, 9999)};
 }
 template <>
 bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
@@ -240,7 +349,8 @@ bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
          AreSamePose(a.world_from_camera, b.world_from_camera) && a.reference_keyframe == b.reference_keyframe &&
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_features == b.num_features &&
          a.num_matches == b.num_matches && a.num_inliers == b.num_inliers && a.num_landmarks == b.num_landmarks &&
-         a.is_keyframe == b.is_keyframe;
+         a.is_keyframe == b.is_keyframe && a.num_deltas == b.num_deltas && a.is_live == b.is_live &&
+         a.map_wait_us == b.map_wait_us;
 }
 
 template <>

@@ -29,6 +29,9 @@ void ForEachValueType(Visit visit) {
   visit.template operator()<ExtractorReady>();
   visit.template operator()<FeatureFrame>();
   visit.template operator()<KeyframeObservation>();
+  visit.template operator()<MapDelta>();
+  visit.template operator()<MapSnapshotPage>();
+  visit.template operator()<MapRequest>();
   visit.template operator()<PoseEstimate>();
   visit.template operator()<StageStatus>();
   visit.template operator()<Heartbeat>();

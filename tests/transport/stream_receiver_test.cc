@@ -8,7 +8,6 @@
 #include <map>
 #include <random>
 
-#include "transport/channel_receiver.h"
 #include "transport/stream_history.h"
 
 namespace tessera {
@@ -288,60 +287,6 @@ TEST(Stream, WaitingMessagesAreBounded) {
   for (int i = 0; i < 2000; ++i) stream.Publish();
   stream.Run(30'000'000);
   stream.ExpectDelivered(0, 1999);
-}
-
-TEST(Channel, ARestartedPublisherBeginsANewStream) {
-  std::vector<std::pair<int64_t, int64_t>> delivered;  // epoch, number
-  std::vector<int64_t> lost;
-  ChannelReceiver channel("POSE", {},
-                          {.deliver = [&](ByteView, const MessageHeader& header,
-                                          int64_t) { delivered.emplace_back(header.epoch_us, header.sequence); },
-                           .lose = [&](const std::string& publisher, int64_t num_messages) {
-                             EXPECT_EQ(publisher, "tracker");
-                             lost.push_back(num_messages);
-                           }});
-  const auto receive = [&](int64_t epoch_us, int64_t sequence) {
-    return channel.OnMessage({.publisher = "tracker", .epoch_us = epoch_us, .sequence = sequence}, MessageOf(0), 0, 0);
-  };
-  receive(100, 0);
-  receive(100, 2);  // 1 is missing when the publisher dies
-  receive(200, 0);
-  EXPECT_TRUE(receive(100, 1));  // a straggler
-  receive(200, 1);
-  EXPECT_EQ(delivered, (std::vector<std::pair<int64_t, int64_t>>{{100, 0}, {100, 2}, {200, 0}, {200, 1}}));
-  EXPECT_EQ(lost, (std::vector<int64_t>{1, 0}));
-  EXPECT_EQ(channel.counts().num_lost, 1);
-}
-
-TEST(Channel, PublishersDoNotWaitForEachOther) {
-  std::vector<std::string> delivered;
-  ChannelReceiver channel("TILE_FEATURES", {},
-                          {.deliver = [&](ByteView, const MessageHeader& header,
-                                          int64_t) { delivered.push_back(header.publisher); },
-                           .lose = [](const std::string&, int64_t) {}});
-  channel.OnMessage({.publisher = "extractor_0", .epoch_us = 1, .sequence = 0}, MessageOf(0), 0, 0);
-  channel.OnMessage({.publisher = "extractor_0", .epoch_us = 1, .sequence = 2}, MessageOf(2), 0, 0);
-  channel.OnMessage({.publisher = "extractor_1", .epoch_us = 2, .sequence = 0}, MessageOf(0), 0, 0);
-  EXPECT_EQ(delivered, (std::vector<std::string>{"extractor_0", "extractor_1"}));
-  channel.OnHeartbeat("extractor_0", 1, {.channel = "TILE_FEATURES", .first_sequence = 0, .next_sequence = 3}, 0);
-  const auto requests = channel.Poll(20'000);
-  ASSERT_EQ(requests.size(), 1U);
-  EXPECT_EQ(requests[0],
-            (RepairRequest{.channel = "TILE_FEATURES", .publisher = "extractor_0", .epoch_us = 1, .ranges = {{1, 1}}}));
-}
-
-TEST(History, KeepsTheNewestAndAnswersOnceInAWhile) {
-  StreamHistory history(20);
-  for (int64_t i = 0; i < 5; ++i) history.Append(MessageOf(i));
-  EXPECT_EQ(history.first(), 3);
-  EXPECT_EQ(history.next(), 5);
-  EXPECT_EQ(history.Resend(2, 0, 5000), nullptr);
-  EXPECT_EQ(history.Resend(5, 0, 5000), nullptr);
-  ASSERT_NE(history.Resend(3, 0, 5000), nullptr);
-  EXPECT_EQ(history.Resend(3, 4999, 5000), nullptr);
-  EXPECT_EQ(*history.Resend(3, 5000, 5000), MessageOf(3));
-  history.Append(Bytes(1000));
-  EXPECT_EQ(history.first(), 5);  // the newest is kept even if it alone is too large
 }
 
 }  // namespace

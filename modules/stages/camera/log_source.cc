@@ -4,6 +4,7 @@
 
 #include "core/errors.h"
 #include "transport/log.h"
+#include "transport/recorded_steps.h"
 
 namespace tessera {
 namespace {
@@ -23,9 +24,10 @@ class LogSource : public FrameSource {
   const std::vector<std::string>& notes() const override { return notes_; }
 
  private:
+  // A live run is repeated as it went: what the dispatcher dropped then is not sent now.
   bool IsWanted(FrameId frame) const {
-    return frame.value >= options_.first_frame &&
-           (options_.last_frame < 0 || frame.value < options_.last_frame);
+    return frame.value >= options_.first_frame && (options_.last_frame < 0 || frame.value < options_.last_frame) &&
+           (!recorded_.is_live || recorded_.steps.contains(frame));
   }
   std::optional<CameraFrame> ReadFrame();
   void CheckOptions() const;
@@ -34,6 +36,7 @@ class LogSource : public FrameSource {
 
   SourceOptions options_;
   LogReader reader_;
+  RecordedSteps recorded_;
   std::optional<CameraCalibration> calibration_;
   std::vector<GroundTruthPose> ground_truth_;
   std::deque<CameraFrame> read_ahead_;  // on the way to the calibration
@@ -41,7 +44,9 @@ class LogSource : public FrameSource {
 };
 
 LogSource::LogSource(const SourceOptions& options, const std::string& channel_prefix)
-    : options_(options), reader_(options.source.substr(std::string("log:").size()), channel_prefix) {
+    : options_(options),
+      reader_(options.source.substr(std::string("log:").size()), channel_prefix),
+      recorded_(ReadRecordedSteps(options.source.substr(std::string("log:").size()), channel_prefix)) {
   CheckOptions();
   ReadUntilCalibrated();
 }
@@ -90,7 +95,7 @@ void LogSource::Take(const CameraCalibration& recorded) {
 }
 
 std::optional<int64_t> LogSource::num_frames() const {
-  const bool is_whole = options_.first_frame == 0 && options_.last_frame < 0;
+  const bool is_whole = options_.first_frame == 0 && options_.last_frame < 0 && !recorded_.is_live;
   return is_whole ? std::optional(reader_.num_frames()) : std::nullopt;
 }
 

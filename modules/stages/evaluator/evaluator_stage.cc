@@ -14,8 +14,9 @@ namespace {
 
 // Each stage speaks twice a second; the figures of a run are those that it gives after the end.
 constexpr int64_t kMaxWaitForStatusUs = 1'000'000;
-// After the tracker's end, a pose that has not come for this long won't come any more.
-constexpr int64_t kLastPoseTimeoutUs = 5'000'000;
+// After the tracker's end, a pose or a change of the map that has not come for this long won't come any more; a bundle
+// adjustment on a busy machine takes a second or two.
+constexpr int64_t kLastNewsTimeoutUs = 10'000'000;
 
 StageFigures FiguresOf(const StageStatus& status) {
   const StepStatistics& step = status.step;
@@ -28,7 +29,9 @@ StageFigures FiguresOf(const StageStatus& status) {
 }  // namespace
 
 EvaluatorStage::EvaluatorStage(StageContext& context)
-    : context_(context), out_dir_(context.settings().Get<std::string>("evaluator.out_dir")) {
+    : context_(context),
+      out_dir_(context.settings().Get<std::string>("evaluator.out_dir")),
+      map_(context, false, [this] { OnDeltas(); }) {
   if (!out_dir_.empty()) {
     std::error_code error;
     std::filesystem::create_directories(out_dir_, error);
@@ -43,9 +46,6 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
     last_news_us_ = context_.now_us();
     FinishIfDone();
   });
-  context.Subscribe<KeyframeObservation>(
-      kKeyframeChannel,
-      [this](const KeyframeObservation& keyframe, const MessageInfo&) { record_.AddKeyframe(keyframe); });
   context.Subscribe<GroundTruthPose>(
       kGroundTruthChannel,
       [this](const GroundTruthPose& truth, const MessageInfo&) { record_.AddGroundTruth(truth); });
@@ -75,15 +75,33 @@ void EvaluatorStage::OnStatus(const StageStatus& status) {
 void EvaluatorStage::OnEnd(const EndOfStream& end) {
   if (end.stage == "tracker" && !end_) {
     end_ = end;
-    last_news_us_ = context_.now_us();
     record_.SetEnd(end.num_frames, end.num_dropped);
-    FinishIfDone();
+  } else if (end.stage == "mapper" && !mapper_end_) {
+    mapper_end_ = end;
+    map_.Expect(end.num_values);
+  } else {
+    return;
   }
+  last_news_us_ = context_.now_us();
+  FinishIfDone();
 }
 
-bool EvaluatorStage::HasAllPoses() const {
-  const bool has_last = last_pose_.value + 1 >= end_->num_frames;
-  return has_last || context_.now_us() - last_news_us_ > kLastPoseTimeoutUs;
+void EvaluatorStage::OnDeltas() {
+  for (const auto& delta : map_.Take()) {
+    if (const std::string problem = record_.ApplyDelta(*delta); !problem.empty()) {
+      map_.Reject(problem);
+      break;
+    }
+  }
+  last_news_us_ = context_.now_us();
+  FinishIfDone();
+}
+
+// All poses and the whole map, or what came of them.
+bool EvaluatorStage::HasAll() const {
+  const bool has_poses = end_ && last_pose_.value + 1 >= end_->num_frames;
+  const bool has_map = mapper_end_ && !map_.needs_snapshot() && record_.map().next_delta() >= mapper_end_->num_values;
+  return (has_poses && has_map) || (end_ && context_.now_us() - last_news_us_ > kLastNewsTimeoutUs);
 }
 
 // Every stage that was alive lately has given its figures since the run was complete.
@@ -95,7 +113,7 @@ bool EvaluatorStage::HaveAllReported() const {
 }
 
 void EvaluatorStage::FinishIfDone() {
-  if (is_written_ || !end_ || !HasAllPoses()) {
+  if (is_written_ || !HasAll()) {
     return;
   }
   if (!complete_us_) {

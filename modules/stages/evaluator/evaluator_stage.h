@@ -8,6 +8,7 @@
 #include <string>
 
 #include "evaluation/run_record.h"
+#include "transport/map_subscription.h"
 #include "transport/stage.h"
 
 namespace tessera {
@@ -24,7 +25,8 @@ class EvaluatorStage {
  private:
   void OnStatus(const StageStatus& status);
   void OnEnd(const EndOfStream& end);
-  bool HasAllPoses() const;
+  void OnDeltas();
+  bool HasAll() const;
   bool HaveAllReported() const;
   void FinishIfDone();
   void Write();
@@ -32,10 +34,12 @@ class EvaluatorStage {
   StageContext& context_;
   std::string out_dir_;
   RunRecord record_;
-  std::optional<EndOfStream> end_;
+  MapSubscription map_;
+  std::optional<EndOfStream> end_;           // the tracker's
+  std::optional<EndOfStream> mapper_end_;
   FrameId last_pose_;
-  int64_t last_news_us_ = 0;                 // when the last pose or the end came
-  std::optional<int64_t> complete_us_;       // when the end and all poses were there
+  int64_t last_news_us_ = 0;                 // when the last pose, change of the map or end came
+  std::optional<int64_t> complete_us_;       // when the ends, all poses and the whole map were there
   std::map<std::string, int64_t> heard_us_;  // by stage: when its last status came
   bool is_written_ = false;
 };

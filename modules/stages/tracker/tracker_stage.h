@@ -1,28 +1,42 @@
-// Wiring of the tracker: features in, poses and keyframes out.
+// Wiring of the tracker: features and changes of the map in, poses and keyframes out. Frames wait here until the changes
+// that they must see are there.
 #pragma once
 
+#include <deque>
 #include <optional>
 
 #include "geometry/camera_frame.h"
-#include "tracking/tracker.h"
+#include "tracking/delta_schedule.h"
+#include "tracking/map_tracker.h"
+#include "transport/map_subscription.h"
 #include "transport/stage.h"
 
 namespace tessera {
 
 class TrackerStage {
  public:
+  // Throws InputError if a setting makes no sense.
   explicit TrackerStage(StageContext& context);
 
  private:
-  void OnFeatures(const FeatureFrame& features);
+  void OnDeltas();
+  void TrackWaiting();
+  std::optional<MapTrackingResult> Step(const FeatureFrame& features);
+  void Publish(MapTrackingResult& result);
   void FinishIfDone();
 
   StageContext& context_;
-  Tracker tracker_;
+  MapTracker tracker_;
+  DeltaSchedule schedule_;
+  MapSubscription map_;
   Publisher<PoseEstimate> poses_;
   Publisher<KeyframeObservation> keyframes_;
   Publisher<EndOfStream> end_of_stream_;
+  std::deque<FeatureFrame> waiting_;
+  std::optional<int64_t> waits_since_us_;  // the first of them could be tracked, but for the map
+  int64_t total_wait_us_ = 0;
   FrameId last_frame_;
+  int64_t num_keyframes_ = 0;
   std::optional<EndOfStream> features_end_;
 };
 

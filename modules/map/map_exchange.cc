@@ -1,0 +1,53 @@
+#include "map/map_exchange.h"
+
+#include <algorithm>
+
+namespace tessera {
+namespace {
+
+// Each about 200 kB on the wire: a keyframe has 108 kB of features, a landmark 104 bytes, an observation 20.
+constexpr size_t kKeyframesPerPage = 2;
+constexpr size_t kLandmarksPerPage = 2048;
+constexpr size_t kObservationsPerPage = 8192;
+
+size_t NumPages(size_t num_items, size_t per_page) { return (num_items + per_page - 1) / per_page; }
+
+template <class Item>
+void CopyPage(const std::vector<Item>& all, size_t page, size_t per_page, std::vector<Item>* part) {
+  const size_t begin = std::min(all.size(), page * per_page), end = std::min(all.size(), begin + per_page);
+  part->assign(all.begin() + static_cast<std::ptrdiff_t>(begin), all.begin() + static_cast<std::ptrdiff_t>(end));
+}
+
+}  // namespace
+
+int32_t NumSnapshotPages(const MapDelta& snapshot) {
+  const size_t num_pages = NumPages(snapshot.new_keyframes.size(), kKeyframesPerPage) +
+                           NumPages(snapshot.changed_landmarks.size(), kLandmarksPerPage) +
+                           NumPages(snapshot.new_observations.size(), kObservationsPerPage);
+  return static_cast<int32_t>(std::max<size_t>(1, num_pages));
+}
+
+// Keyframes come first, then landmarks, then observations, which need both.
+MapSnapshotPage CutSnapshotPage(const MapDelta& snapshot, int32_t page) {
+  MapSnapshotPage cut;
+  cut.page = page;
+  cut.num_pages = NumSnapshotPages(snapshot);
+  cut.part.number = snapshot.number;
+  cut.part.answers = snapshot.answers;
+  cut.part.is_snapshot = true;
+  cut.part.hash = snapshot.hash;
+  auto left = static_cast<size_t>(page);
+  const size_t num_keyframe_pages = NumPages(snapshot.new_keyframes.size(), kKeyframesPerPage);
+  const size_t num_landmark_pages = NumPages(snapshot.changed_landmarks.size(), kLandmarksPerPage);
+  if (left < num_keyframe_pages) {
+    CopyPage(snapshot.new_keyframes, left, kKeyframesPerPage, &cut.part.new_keyframes);
+  } else if ((left -= num_keyframe_pages) < num_landmark_pages) {
+    CopyPage(snapshot.changed_landmarks, left, kLandmarksPerPage, &cut.part.changed_landmarks);
+  } else {
+    left -= num_landmark_pages;
+    CopyPage(snapshot.new_observations, left, kObservationsPerPage, &cut.part.new_observations);
+  }
+  return cut;
+}
+
+}  // namespace tessera

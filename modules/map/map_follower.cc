@@ -1,0 +1,69 @@
+#include "map/map_follower.h"
+
+#include <utility>
+
+namespace tessera {
+namespace {
+
+template <class Item>
+void Append(const std::vector<Item>& part, std::vector<Item>* whole) {
+  whole->insert(whole->end(), part.begin(), part.end());
+}
+
+}  // namespace
+
+void MapFollower::Receive(Delta delta) {
+  // What follows a snapshot that is on its way may have a number that was given out before.
+  if ((delta->number < next_delta_ && !needs_snapshot_) || waiting_.size() >= kMaxWaiting) return;
+  if (delta->number == next_delta_ && !needs_snapshot_) {
+    lacks_start_ = false;
+    collected_.reset();
+  }
+  waiting_[delta->number] = std::move(delta);
+}
+
+void MapFollower::Receive(const MapSnapshotPage& page) {
+  if (!Request()) return;  // somebody else's
+  if (page.page == 0 && (!collected_ || page.part.number > collected_->whole.number)) {
+    if (page.part.number < next_delta_ && !needs_snapshot_) return;
+    collected_ = Collected{page.num_pages, 0, page.part};
+  } else if (!collected_ || page.page != collected_->next_page || page.num_pages != collected_->num_pages ||
+             page.part.number != collected_->whole.number) {
+    return;
+  } else {
+    Append(page.part.new_keyframes, &collected_->whole.new_keyframes);
+    Append(page.part.changed_landmarks, &collected_->whole.changed_landmarks);
+    Append(page.part.new_observations, &collected_->whole.new_observations);
+  }
+  if (++collected_->next_page == collected_->num_pages) Complete();
+}
+
+void MapFollower::Complete() {
+  snapshot_ = std::make_shared<const MapDelta>(std::move(collected_->whole));
+  collected_.reset();
+  next_delta_ = snapshot_->number + 1;
+  waiting_.erase(waiting_.begin(), waiting_.lower_bound(next_delta_));
+  needs_snapshot_ = false;
+  lacks_start_ = false;
+}
+
+std::vector<MapFollower::Delta> MapFollower::Take() {
+  std::vector<Delta> deltas;
+  if (needs_snapshot_) return deltas;
+  if (snapshot_ != nullptr) deltas.push_back(std::exchange(snapshot_, nullptr));
+  for (auto it = waiting_.begin(); it != waiting_.end() && it->first == next_delta_; it = waiting_.erase(it)) {
+    deltas.push_back(std::move(it->second));
+    ++next_delta_;
+  }
+  return deltas;
+}
+
+std::optional<MapRequest> MapFollower::Request() const {
+  if (collected_) return MapRequest{next_delta_, collected_->whole.number, collected_->next_page};
+  if (needs_snapshot_) return MapRequest{};
+  const bool has_gap = next_delta_ < num_known_ || (!waiting_.empty() && waiting_.begin()->first > next_delta_);
+  if (has_gap || lacks_start_) return MapRequest{.next_delta = next_delta_};
+  return std::nullopt;
+}
+
+}  // namespace tessera

@@ -1,0 +1,50 @@
+// From light to grey values: what a real camera adds to a perfect picture.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "core/image.h"
+#include "geometry/camera.h"
+#include "simulation/renderer.h"
+
+namespace tessera {
+
+struct CameraEffects {
+  double exposure_s = 0.006;      // motion blur: the shutter is open for so long
+  double exposure_drift = 0.12;   // the gain wanders within 1 +- this, over some seconds
+  double vignetting = 0.2;        // light lost in the corners
+  double read_noise = 1.3;        // standard deviation in the dark, grey values
+  double shot_noise = 0.012;      // variance per grey value of light
+  double depth_noise = 0.0015;    // RGB-D: standard deviation of depth per squared metre, 1/m
+};
+
+// The camera's velocity in its own frame, per second.
+struct CameraVelocity {
+  Eigen::Vector3d linear_mps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_radps = Eigen::Vector3d::Zero();
+};
+
+class EffectsPipeline {
+ public:
+  EffectsPipeline(const CameraCalibration& camera, const CameraEffects& effects, uint32_t seed);
+
+  // Blurs along the apparent motion, spreads light over neighbouring pixels (1 6 1) / 8 in both directions, applies gain
+  // and vignetting, adds noise. `picture` numbers the pictures of all eyes; the gain depends on `time_s` alone.
+  GrayImage Apply(const Rendering& rendering, const CameraVelocity& velocity, double time_s, uint32_t picture);
+  // Depth counts of calibration.depth_unit_m, with noise; 0 where nothing is or the count does not fit.
+  DepthImage Depth(const Rendering& rendering, uint32_t picture) const;
+
+ private:
+  void BlurMotion(const Rendering& rendering, const CameraVelocity& velocity);
+  void Spread();
+
+  CameraCalibration camera_;
+  CameraEffects effects_;
+  uint32_t seed_;
+  RadianceImage blurred_;
+  RadianceImage spread_;
+  Image<float> vignette_;  // factor by pixel
+};
+
+}  // namespace tessera

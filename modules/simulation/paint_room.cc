@@ -1,0 +1,71 @@
+// What a room is furnished with.
+#include <algorithm>
+
+#include "simulation/canvas.h"
+#include "simulation/paint.h"
+
+namespace tessera {
+
+Texture PaintWallpaper(const PaintSpec& spec) {
+  Random random(HashOf(spec.seed, 21));
+  const double tone = random.Uniform(140.0, 195.0);
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, tone, {5.0, 14.0});
+  canvas.Fill({0.0, 0.0, spec.width_m, 0.1}, tone - 70.0);  // skirting board
+  for (int i = 0; i < static_cast<int>(2.0 * spec.width_m); ++i) {  // switches, sockets, hooks, notes
+    const double size = random.Uniform(0.05, 0.2);
+    canvas.Fill({random.Uniform(0.0, spec.width_m - size), random.Uniform(0.2, spec.height_m - 0.3), size,
+                 random.Uniform(0.05, 0.25)},
+                random.Uniform(30.0, 240.0), {4.0, 4.0});
+  }
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+Texture PaintPoster(const PaintSpec& spec) {
+  Random random(HashOf(spec.seed, 22));
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, random.Uniform(40.0, 210.0), {8.0, 30.0});
+  for (int i = 0; i < 14; ++i) {
+    const double width = random.Uniform(0.1, 0.5) * spec.width_m;
+    const double height = random.Uniform(0.05, 0.4) * spec.height_m;
+    canvas.Fill({random.Uniform(0.0, spec.width_m - width), random.Uniform(0.0, spec.height_m - height), width, height},
+                random.Uniform(20.0, 240.0), {8.0, 20.0});
+  }
+  canvas.Scribble({0.1 * spec.width_m, 0.08 * spec.height_m, 0.8 * spec.width_m, 0.2 * spec.height_m},
+                  0.06 * spec.width_m, 20.0);
+  canvas.Frame({0.0, 0.0, spec.width_m, spec.height_m}, 0.03, random.Uniform(15.0, 90.0));
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+Texture PaintBooks(const PaintSpec& spec) {
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, 40.0, {5.0, 8.0});
+  Random& random = canvas.random();
+  const double shelf_m = 0.36;
+  for (double y = 0.04; y + shelf_m <= spec.height_m + 0.04; y += shelf_m) {
+    canvas.Fill({0.0, y - 0.04, spec.width_m, 0.04}, 150.0, {8.0, 10.0});
+    for (double x = 0.02; x < spec.width_m - 0.06;) {
+      const double thickness = random.Uniform(0.015, 0.06);
+      const double height = random.Uniform(0.18, 0.31);
+      const double tone = random.Uniform(30.0, 225.0);
+      canvas.Fill({x, y, thickness, height}, tone, {4.0, 6.0});
+      canvas.Fill({x, y + random.Uniform(0.4, 0.8) * height, thickness, 0.02}, tone > 120.0 ? 30.0 : 220.0);
+      x += thickness + (random.Chance(0.06) ? random.Uniform(0.05, 0.25) : 0.004);
+    }
+  }
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+Texture PaintWood(const PaintSpec& spec) {
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, 50.0, {4.0, 4.0});
+  Random& random = canvas.random();
+  const double tone = random.Uniform(80.0, 165.0);
+  const double plank_m = random.Uniform(0.1, 0.2);
+  for (double y = 0.0; y < spec.height_m; y += plank_m) {
+    for (double x = -random.Uniform(0.0, 1.5); x < spec.width_m;) {
+      const double length = random.Uniform(0.8, 1.8);
+      canvas.Fill({x, y, length - 0.006, plank_m - 0.006}, tone + random.Uniform(-25.0, 25.0), {9.0, 14.0});
+      x += length;
+    }
+  }
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+}  // namespace tessera

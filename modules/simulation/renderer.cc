@@ -1,0 +1,306 @@
+#include "simulation/renderer.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace tessera {
+namespace {
+
+constexpr double kNearM = 0.1;
+constexpr size_t kMaxPaintBytes = size_t{600} << 20;
+constexpr int kChunk = 16;  // pixels that share a level of the paint
+constexpr uint16_t kHorizonGrey = 205 * 256;
+
+// A parallelogram in camera coordinates, set up for drawing. With n = across x up, the plane's point on the ray
+// r = (x, y, 1) is r / w with
+//   w = 1 / z = (n . r) / (n . corner),
+// and its place in the parallelogram is, with the dual basis a* = (up x n) / |n|^2, b* = (n x across) / |n|^2,
+//   a = (a* . r) / w - a* . corner,   b likewise:
+// each numerator is affine in the pixel.
+struct AffineRow {
+  float at_zero, by_x;
+};
+
+struct Plane {
+  Eigen::Vector3d inverse_depth;  // dot with r gives w
+  Eigen::Vector3d a, b;           // numerators, in texels of the finest level
+  double a_offset, b_offset;
+};
+
+class Drawer {
+ public:
+  Drawer(const CameraCalibration& camera, Rendering& out) : camera_(camera), out_(out) {}
+
+  void Draw(const Surface& surface, const Rigid3& camera_from_world, const Texture& texture);
+
+ private:
+  struct Span {
+    int first, last;  // pixels [first, last)
+  };
+
+  // The parallelogram cut at z = kNearM, in pixels; fewer than three points: nothing to see.
+  std::vector<Eigen::Vector2d> Outline(const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up) const;
+  static Plane MakePlane(const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up,
+                         const GrayImage& finest);
+  // Pixels of row y whose middle lies inside the convex outline.
+  Span SpanOf(const std::vector<Eigen::Vector2d>& outline, int y) const;
+  AffineRow RowOf(const Eigen::Vector3d& coefficients, int y) const;
+  void DrawRow(const Plane& plane, const Surface& surface, const Texture& texture, int y, const Span& span);
+
+  const CameraCalibration& camera_;
+  Rendering& out_;
+};
+
+std::vector<Eigen::Vector2d> Drawer::Outline(const Eigen::Vector3d& corner, const Eigen::Vector3d& across,
+                                             const Eigen::Vector3d& up) const {
+  const std::array<Eigen::Vector3d, 4> points{corner, corner + across, corner + across + up, corner + up};
+  std::vector<Eigen::Vector2d> outline;
+  for (size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector3d& from = points[i];
+    const Eigen::Vector3d& to = points[(i + 1) % 4];
+    if (from.z() >= kNearM) outline.push_back(camera_.Project(from));
+    if ((from.z() >= kNearM) != (to.z() >= kNearM)) {
+      const double part = (kNearM - from.z()) / (to.z() - from.z());
+      Eigen::Vector3d cut = from + part * (to - from);
+      cut.z() = kNearM;
+      outline.push_back(camera_.Project(cut));
+    }
+  }
+  return outline;
+}
+
+Plane Drawer::MakePlane(const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up,
+                        const GrayImage& finest) {
+  const Eigen::Vector3d n = across.cross(up);
+  const double squared = n.squaredNorm();
+  // Rows of the paint run from top to bottom.
+  const Eigen::Vector3d a = up.cross(n) * (finest.width / squared);
+  const Eigen::Vector3d b = n.cross(across) * (-finest.height / squared);
+  return {n / n.dot(corner), a, b, -a.dot(corner), finest.height - b.dot(corner)};
+}
+
+Drawer::Span Drawer::SpanOf(const std::vector<Eigen::Vector2d>& outline, int y) const {
+  double low = 1e9;
+  double high = -1e9;
+  for (size_t i = 0; i < outline.size(); ++i) {
+    const Eigen::Vector2d& p = outline[i];
+    const Eigen::Vector2d& q = outline[(i + 1) % outline.size()];
+    if ((p.y() <= y) == (q.y() <= y)) continue;
+    const double x = p.x() + (y - p.y()) / (q.y() - p.y()) * (q.x() - p.x());
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+  if (low > high) return {0, 0};
+  const double first = std::clamp(std::ceil(low), 0.0, static_cast<double>(camera_.width_px));
+  const double last = std::clamp(std::ceil(high), 0.0, static_cast<double>(camera_.width_px));
+  return {static_cast<int>(first), static_cast<int>(last)};
+}
+
+AffineRow Drawer::RowOf(const Eigen::Vector3d& c, int y) const {
+  const double ray_y = (y - camera_.cy_px) / camera_.fy_px;
+  const double by_x = c.x() / camera_.fx_px;
+  return {static_cast<float>(c.y() * ray_y + c.z() - by_x * camera_.cx_px), static_cast<float>(by_x)};
+}
+
+// log2 of a positive number, rounded down.
+int FloorLog2(float x) { return static_cast<int>(std::bit_cast<uint32_t>(x) >> 23) - 127; }
+
+void Drawer::DrawRow(const Plane& plane, const Surface& surface, const Texture& texture, int y, const Span& span) {
+  const AffineRow w_row = RowOf(plane.inverse_depth, y);
+  const AffineRow a_row = RowOf(plane.a, y);
+  const AffineRow b_row = RowOf(plane.b, y);
+  const auto a_offset = static_cast<float>(plane.a_offset);
+  const auto b_offset = static_cast<float>(plane.b_offset);
+  const auto w_by_y = static_cast<float>(plane.inverse_depth.y() / camera_.fy_px);
+  const auto a_by_y = static_cast<float>(plane.a.y() / camera_.fy_px);
+  const auto b_by_y = static_cast<float>(plane.b.y() / camera_.fy_px);
+  const auto brightness = static_cast<int>(surface.brightness * 256.0F);
+  uint16_t* radiance = out_.radiance.row(y);
+  float* inverse_depth = out_.inverse_depth.row(y);
+  for (int begin = span.first; begin < span.last; begin += kChunk) {
+    const int end = std::min(begin + kChunk, span.last);
+    // Texels that one pixel covers along rows and columns, in the chunk's middle: d(a / w) = (da - (a / w) dw) / w.
+    const float x_mid = 0.5F * static_cast<float>(begin + end - 1);
+    const float w_mid = w_row.at_zero + x_mid * w_row.by_x;
+    const float z_mid = 1.0F / std::max(w_mid, 1e-6F);
+    const float a_mid = (a_row.at_zero + x_mid * a_row.by_x) * z_mid;
+    const float b_mid = (b_row.at_zero + x_mid * b_row.by_x) * z_mid;
+    const auto square = [](float v) { return v * v; };
+    const float by_x = square((a_row.by_x - a_mid * w_row.by_x) * z_mid) + square((b_row.by_x - b_mid * w_row.by_x) * z_mid);
+    const float by_y = square((a_by_y - a_mid * w_by_y) * z_mid) + square((b_by_y - b_mid * w_by_y) * z_mid);
+    // Between the two: the larger alone would blur what is seen at a flat angle.
+    const float covered = std::clamp(std::sqrt(by_x * by_y) * 0.7F + 0.3F * std::max(by_x, by_y), 1e-12F, 1e12F);
+    const int level = std::clamp((FloorLog2(covered) + 1) / 2, 0, static_cast<int>(texture.levels.size()) - 1);
+    const GrayImage& paint = texture.levels[static_cast<size_t>(level)];
+    const GrayImage* cover = texture.cover.empty() ? nullptr : &texture.cover[static_cast<size_t>(level)];
+    const float scale_a = static_cast<float>(paint.width) / static_cast<float>(texture.levels[0].width);
+    const float scale_b = static_cast<float>(paint.height) / static_cast<float>(texture.levels[0].height);
+    const float max_a = static_cast<float>(paint.width - 1) - 0.01F;
+    const float max_b = static_cast<float>(paint.height - 1) - 0.01F;
+    for (int x = begin; x < end; ++x) {
+      const auto xf = static_cast<float>(x);
+      const float w = w_row.at_zero + xf * w_row.by_x;
+      if (w <= inverse_depth[x]) continue;
+      const float z = 1.0F / w;
+      const float a = std::clamp(((a_row.at_zero + xf * a_row.by_x) * z + a_offset) * scale_a - 0.5F, 0.0F, max_a);
+      const float b = std::clamp(((b_row.at_zero + xf * b_row.by_x) * z + b_offset) * scale_b - 0.5F, 0.0F, max_b);
+      const auto a_fixed = static_cast<int>(a * 256.0F);
+      const auto b_fixed = static_cast<int>(b * 256.0F);
+      const ptrdiff_t index = static_cast<ptrdiff_t>(b_fixed >> 8) * paint.width + (a_fixed >> 8);
+      if (cover != nullptr && cover->pixels[static_cast<size_t>(index)] < 128) continue;
+      const uint8_t* texel = paint.pixels.data() + index;
+      const int right = a_fixed & 255;
+      const int down = b_fixed & 255;
+      const int top = texel[0] * (256 - right) + texel[1] * right;
+      const int bottom = texel[paint.width] * (256 - right) + texel[paint.width + 1] * right;
+      const int grey = (top * (256 - down) + bottom * down) >> 8;  // times 256
+      radiance[x] = static_cast<uint16_t>(std::min((grey * brightness) >> 8, 65535));
+      inverse_depth[x] = w;
+    }
+  }
+}
+
+void Drawer::Draw(const Surface& surface, const Rigid3& camera_from_world, const Texture& texture) {
+  const Eigen::Vector3d corner = camera_from_world * surface.corner;
+  const Eigen::Vector3d across = camera_from_world.rotation * surface.across;
+  const Eigen::Vector3d up = camera_from_world.rotation * surface.up;
+  const std::vector<Eigen::Vector2d> outline = Outline(corner, across, up);
+  if (outline.size() < 3) return;
+  double top = 1e9;
+  double bottom = -1e9;
+  for (const Eigen::Vector2d& p : outline) {
+    top = std::min(top, p.y());
+    bottom = std::max(bottom, p.y());
+  }
+  const int first = static_cast<int>(std::clamp(std::ceil(top), 0.0, static_cast<double>(camera_.height_px)));
+  const int last = static_cast<int>(std::clamp(std::ceil(bottom), 0.0, static_cast<double>(camera_.height_px)));
+  const Plane plane = MakePlane(corner, across, up, texture.levels[0]);
+  for (int y = first; y < last; ++y) {
+    const Span span = SpanOf(outline, y);
+    if (span.first < span.last) DrawRow(plane, surface, texture, y, span);
+  }
+}
+
+// Whether part of the surface can lie inside the picture.
+bool IsInSight(const Surface& surface, const CameraCalibration& camera, const Rigid3& camera_from_world) {
+  const Eigen::Vector3d corner = camera_from_world * surface.corner;
+  const Eigen::Vector3d across = camera_from_world.rotation * surface.across;
+  const Eigen::Vector3d up = camera_from_world.rotation * surface.up;
+  if (!surface.two_sided && across.cross(up).dot(corner) >= 0.0) return false;  // seen from behind
+  // Planes through the eye and the picture's borders: all four corners beyond one of them can't be seen.
+  const double left = -camera.cx_px / camera.fx_px, right = (camera.width_px - camera.cx_px) / camera.fx_px;
+  const double top = -camera.cy_px / camera.fy_px, bottom = (camera.height_px - camera.cy_px) / camera.fy_px;
+  int beyond[5] = {};
+  for (const Eigen::Vector3d& p : {corner, Eigen::Vector3d(corner + across), Eigen::Vector3d(corner + up), Eigen::Vector3d(corner + across + up)}) {
+    beyond[0] += p.z() < kNearM ? 1 : 0;
+    beyond[1] += p.x() < left * p.z() ? 1 : 0;
+    beyond[2] += p.x() > right * p.z() ? 1 : 0;
+    beyond[3] += p.y() < top * p.z() ? 1 : 0;
+    beyond[4] += p.y() > bottom * p.z() ? 1 : 0;
+  }
+  return std::none_of(std::begin(beyond), std::end(beyond), [](int num) { return num == 4; });
+}
+
+// The car's body at this time; nullopt once it has left its way.
+std::optional<std::vector<Surface>> PlaceCar(const MovingCar& car, double time_s) {
+  const double place = (car.start_m + car.speed_mps * time_s) / kCarStepM;
+  if (place < 1.0 || place + 2.0 >= static_cast<double>(car.way.size())) return std::nullopt;
+  const auto i = static_cast<size_t>(place);
+  const Eigen::Vector2d step = car.way[i + 1] - car.way[i];
+  const Eigen::Vector2d middle = car.way[i] + (place - static_cast<double>(i)) * step;
+  // Between the directions of the segments before and after, so that the car turns smoothly.
+  const Eigen::Vector2d ahead = (car.way[i + 2] - car.way[i - 1]).normalized();
+  const Eigen::Vector2d right = RightOf(ahead);
+  const auto turn = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
+    const Eigen::Vector2d ground = v.x() * right + v.z() * ahead;
+    return {ground.x(), v.y(), ground.y()};
+  };
+  std::vector<Surface> body = car.body;
+  for (Surface& surface : body) {
+    surface.corner = turn(surface.corner) + Eigen::Vector3d(middle.x(), 0.0, middle.y());
+    surface.across = turn(surface.across);
+    surface.up = turn(surface.up);
+  }
+  return body;
+}
+
+}  // namespace
+
+PaintStore::PaintStore(std::shared_ptr<const World> world) : world_(std::move(world)), entries_(world_->paints.size()) {}
+
+const Texture& PaintStore::Get(int32_t paint) {
+  std::unique_ptr<Entry>& entry = entries_[static_cast<size_t>(paint)];
+  if (!entry) {
+    MakeRoom();
+    entry = std::make_unique<Entry>();
+    entry->texture = Paint(world_->paints[static_cast<size_t>(paint)], world_->streets.get());
+    for (const GrayImage& level : entry->texture.levels) entry->num_bytes += level.pixels.size();
+    for (const GrayImage& level : entry->texture.cover) entry->num_bytes += level.pixels.size();
+    num_bytes_ += entry->num_bytes;
+  }
+  entry->last_use = ++num_uses_;
+  return entry->texture;
+}
+
+// Forgets the half that was not used for the longest time.
+void PaintStore::MakeRoom() {
+  if (num_bytes_ < kMaxPaintBytes) return;
+  std::vector<uint64_t> uses;
+  for (const auto& entry : entries_) {
+    if (entry) uses.push_back(entry->last_use);
+  }
+  const auto median = uses.begin() + static_cast<ptrdiff_t>(uses.size() / 2);
+  std::nth_element(uses.begin(), median, uses.end());
+  for (auto& entry : entries_) {
+    if (entry && entry->last_use < *median) {
+      num_bytes_ -= entry->num_bytes;
+      entry.reset();
+    }
+  }
+}
+
+Renderer::Renderer(std::shared_ptr<const World> world) : world_(std::move(world)), paints_(world_) {}
+Renderer::~Renderer() = default;
+
+void Renderer::Collect(const CameraCalibration& camera, const Rigid3& camera_from_world, double time_s) {
+  // No moving car is drawn so near that it could sit on the camera.
+  constexpr double kCarGapM = 4.5;
+  visible_.clear();
+  const Eigen::Vector3d eye = camera_from_world.Inverse().translation;
+  const auto add = [&](const Surface& surface, double sight_m) {
+    const double distance = (surface.Centre() - eye).norm() - 0.5 * (surface.across + surface.up).norm();
+    if (distance < sight_m && IsInSight(surface, camera, camera_from_world)) {
+      visible_.push_back({distance, visible_.size(), surface});
+    }
+  };
+  for (const Surface& surface : world_->surfaces) add(surface, world_->sight_m);
+  for (const Surface& surface : world_->far) add(surface, 1e9);
+  for (const MovingCar& car : world_->cars) {
+    const auto body = PlaceCar(car, time_s);
+    if (!body || (body->front().Centre() - eye).norm() < kCarGapM) continue;
+    for (const Surface& surface : *body) add(surface, world_->sight_m);
+  }
+  std::sort(visible_.begin(), visible_.end(), [](const Visible& a, const Visible& b) {
+    return std::pair(a.distance_m, a.order) < std::pair(b.distance_m, b.order);
+  });
+}
+
+void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out) {
+  if (out.radiance.width != camera.width_px || out.radiance.height != camera.height_px) {
+    out = {RadianceImage(camera.width_px, camera.height_px), InverseDepthImage(camera.width_px, camera.height_px)};
+  }
+  std::fill(out.radiance.pixels.begin(), out.radiance.pixels.end(), kHorizonGrey);
+  std::fill(out.inverse_depth.pixels.begin(), out.inverse_depth.pixels.end(), 0.0F);
+  const Rigid3 camera_from_world = world_from_camera.Inverse();
+  Collect(camera, camera_from_world, time_s);
+  Drawer drawer(camera, out);
+  for (const Visible& visible : visible_) {
+    drawer.Draw(visible.surface, camera_from_world, paints_.Get(visible.surface.paint));
+  }
+}
+
+}  // namespace tessera

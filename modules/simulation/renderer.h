@@ -1,0 +1,65 @@
+// Draws a world as a pinhole camera sees it, with the depth of each pixel. One thread; float arithmetic in a fixed order.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/image.h"
+#include "geometry/camera.h"
+#include "geometry/rigid3.h"
+#include "simulation/world.h"
+
+namespace tessera {
+
+using RadianceImage = Image<uint16_t>;      // grey values times 256: light that reaches a pixel
+using InverseDepthImage = Image<float>;     // 1 / z of the surface in the middle of the pixel, 1/m; 0: nothing there
+
+struct Rendering {
+  RadianceImage radiance;
+  InverseDepthImage inverse_depth;
+};
+
+// Paints of a world, made when first seen and kept while lately used.
+class PaintStore {
+ public:
+  explicit PaintStore(std::shared_ptr<const World> world);
+  const Texture& Get(int32_t paint);
+
+ private:
+  struct Entry {
+    Texture texture;
+    size_t num_bytes = 0;
+    uint64_t last_use = 0;
+  };
+  void MakeRoom();
+
+  std::shared_ptr<const World> world_;
+  std::vector<std::unique_ptr<Entry>> entries_;  // by paint
+  size_t num_bytes_ = 0;
+  uint64_t num_uses_ = 0;
+};
+
+class Renderer {
+ public:
+  explicit Renderer(std::shared_ptr<const World> world);
+  ~Renderer();
+
+  // The world at this time, from this place. Surfaces are drawn from near to far against a buffer of inverse depths;
+  // paint is looked up bilinearly in the level whose texels are about as large as a pixel.
+  void Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out);
+
+ private:
+  struct Visible {
+    double distance_m;
+    size_t order;  // ties
+    Surface surface;
+  };
+  void Collect(const CameraCalibration& camera, const Rigid3& camera_from_world, double time_s);
+
+  std::shared_ptr<const World> world_;
+  PaintStore paints_;
+  std::vector<Visible> visible_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,166 @@
+#include "simulation/simulation.h"
+
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/errors.h"
+
+namespace tessera {
+namespace {
+
+using Scene = SimulationOptions::Scene;
+
+constexpr double kStreetBaselineM = 0.54;
+constexpr double kRoomBaselineM = 0.12;
+const Eigen::Vector3d kRoomM(6.4, 2.7, 5.2);
+
+bool IsStreet(Scene scene) { return scene != Scene::kRoom; }
+
+CameraCalibration MakeCamera(const SimulationOptions& options, SensorType sensor) {
+  const bool is_street = IsStreet(options.scene);
+  const double s = options.scale;
+  CameraCalibration camera;
+  camera.sensor = sensor;
+  camera.width_px = static_cast<int>(std::lround(s * (is_street ? 1241 : 640)));
+  camera.height_px = static_cast<int>(std::lround(s * (is_street ? 376 : 480)));
+  camera.fx_px = camera.fy_px = s * (is_street ? 718.0 : 525.0);
+  // Where a point of the image lies when pixels shrink: (c + 1/2) s - 1/2.
+  camera.cx_px = s * (is_street ? 620.5 : 320.0) - 0.5;
+  camera.cy_px = s * (is_street ? 188.0 : 240.0) - 0.5;
+  camera.baseline_m = sensor == SensorType::kStereo ? (is_street ? kStreetBaselineM : kRoomBaselineM) : 0.0;
+  camera.depth_unit_m = sensor == SensorType::kRgbd ? 0.001 : 0.0;
+  return camera;
+}
+
+CameraEffects MakeEffects(const SimulationOptions& options) {
+  CameraEffects effects;
+  effects.exposure_s = IsStreet(options.scene) ? 0.004 : 0.008;
+  effects.read_noise *= options.noise;
+  effects.shot_noise *= options.noise * options.noise;
+  effects.depth_noise *= options.noise;
+  return effects;
+}
+
+StreetPlan MakePlan(const SimulationOptions& options) {
+  if (!options.path.empty()) return PlanFromPoses(options.path, options.length_m);
+  return options.scene == Scene::kStreet ? PlanTown(options.seed, options.length_m) : PlanRound(options.seed, options.length_m);
+}
+
+double ParseNumber(const std::string& key, const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    throw InputError("sim: " + key + "=" + text + " is not a number");
+  }
+  return value;
+}
+
+void SetOption(const std::string& key, const std::string& value, SimulationOptions& options) {
+  if (key == "path") {
+    options.path = value;
+    return;
+  }
+  const double number = ParseNumber(key, value);
+  const std::map<std::string, double*> numbers{{"length", &options.length_m}, {"duration", &options.duration_s},
+                                               {"speed", &options.speed},     {"noise", &options.noise},
+                                               {"scale", &options.scale}};
+  if (const auto found = numbers.find(key); found != numbers.end()) {
+    *found->second = number;
+  } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
+    options.seed = static_cast<uint32_t>(number);
+  } else {
+    throw InputError("sim: `" + key + "=" + value + "` is unknown or out of range: give seed, length (m), duration (s), speed, "
+                     "noise, scale or path");
+  }
+}
+
+}  // namespace
+
+std::string SimulationOptions::Check() const {
+  if (!(length_m >= 0.0 && length_m < 1e5)) return "sim: length must lie between 0 and 100000 m";
+  if (!(duration_s > 0.0 && duration_s < 1e5)) return "sim: duration must lie between 0 and 100000 s";
+  if (!(speed >= 0.05 && speed <= 10.0)) return "sim: speed must lie between 0.05 and 10 times the usual";
+  if (!(noise >= 0.0 && noise <= 20.0)) return "sim: noise must lie between 0 and 20 times the usual";
+  if (!(scale >= 0.1 && scale <= 4.0)) return "sim: scale must lie between 0.1 and 4 times the usual";
+  return "";
+}
+
+SimulationOptions ParseSimulation(const std::string& text) {
+  SimulationOptions options;
+  const std::string name = text.substr(0, text.find(','));
+  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort}, {"room", Scene::kRoom}};
+  const auto scene = scenes.find(name);
+  if (scene == scenes.end()) throw InputError("sim:" + name + " is unknown: give sim:street, sim:street-short or sim:room");
+  options.scene = scene->second;
+  for (size_t begin = name.size(); begin < text.size();) {
+    const size_t end = std::min(text.find(',', begin + 1), text.size());
+    const std::string option = text.substr(begin + 1, end - begin - 1);
+    const size_t equals = option.find('=');
+    if (equals == std::string::npos) throw InputError("sim: `" + option + "` must be KEY=VALUE, such as seed=3");
+    SetOption(option.substr(0, equals), option.substr(equals + 1), options);
+    begin = end;
+  }
+  if (const std::string problem = options.Check(); !problem.empty()) throw InputError(problem);
+  return options;
+}
+
+Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
+    : options_(options), camera_(MakeCamera(options, sensor)) {
+  if (const std::string problem = options.Check(); !problem.empty()) throw InputError(problem);
+  if (IsStreet(options.scene)) {
+    const StreetPlan plan = MakePlan(options);
+    trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed);
+    renderer_ = std::make_unique<Renderer>(std::make_shared<const World>(BuildStreets(plan, options.seed)));
+  } else {
+    frames_per_s_ = 30.0;
+    trajectory_ = std::make_unique<HandTrajectory>(kRoomM, options.duration_s, options.speed, options.seed);
+    renderer_ = std::make_unique<Renderer>(std::make_shared<const World>(BuildRoom(kRoomM, options.seed)));
+  }
+  num_frames_ = static_cast<int64_t>(trajectory_->duration_s() * frames_per_s_);
+  effects_ = std::make_unique<EffectsPipeline>(camera_, MakeEffects(options), options.seed);
+}
+
+Simulation::~Simulation() = default;
+
+double Simulation::TimeOf(FrameId frame) const { return static_cast<double>(frame.value) / frames_per_s_; }
+int64_t Simulation::UtimeOf(FrameId frame) const { return std::llround(1e6 * TimeOf(frame)); }
+Rigid3 Simulation::WorldFromCamera(FrameId frame) const { return trajectory_->WorldFromCamera(TimeOf(frame)); }
+
+CameraVelocity Simulation::VelocityAt(double time_s) const {
+  constexpr double kStepS = 0.002;
+  const double duration = trajectory_->duration_s();
+  const Rigid3 before = trajectory_->WorldFromCamera(std::max(0.0, time_s - kStepS));
+  const Rigid3 after = trajectory_->WorldFromCamera(std::min(duration, time_s + kStepS));
+  const Rigid3 step = before.Inverse() * after;
+  // The vector part of a small rotation's quaternion is half its angle.
+  return {step.translation / (2.0 * kStepS), 2.0 * step.rotation.vec() / (2.0 * kStepS)};
+}
+
+void Simulation::RenderPerfect(FrameId frame, Rendering& out) {
+  renderer_->Render(camera_, WorldFromCamera(frame), TimeOf(frame), out);
+}
+
+CameraFrame Simulation::Render(FrameId id) {
+  const double time = TimeOf(id);
+  const Rigid3 world_from_left = WorldFromCamera(id);
+  const CameraVelocity velocity = VelocityAt(time);
+  const auto picture = static_cast<uint32_t>(2 * id.value);
+  CameraFrame frame;
+  frame.id = id;
+  frame.utime_us = UtimeOf(id);
+  frame.sensor = camera_.sensor;
+  renderer_->Render(camera_, world_from_left, time, rendering_);
+  frame.left = effects_->Apply(rendering_, velocity, time, picture);
+  if (camera_.sensor == SensorType::kRgbd) {
+    frame.depth = effects_->Depth(rendering_, picture);
+  } else if (camera_.sensor == SensorType::kStereo) {
+    const Rigid3 left_from_right{Eigen::Quaterniond::Identity(), {camera_.baseline_m, 0.0, 0.0}};
+    renderer_->Render(camera_, world_from_left * left_from_right, time, rendering_);
+    frame.right = effects_->Apply(rendering_, velocity, time, picture + 1);
+  }
+  return frame;
+}
+
+}  // namespace tessera

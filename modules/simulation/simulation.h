@@ -1,0 +1,62 @@
+// A simulated drive or walk: any frame of it, with its exact pose. The same options give the same bytes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "geometry/camera_frame.h"
+#include "simulation/camera_effects.h"
+#include "simulation/drive.h"
+#include "simulation/renderer.h"
+
+namespace tessera {
+
+struct SimulationOptions {
+  enum class Scene { kStreet, kStreetShort, kRoom };
+  Scene scene = Scene::kStreet;
+  uint32_t seed = 1;       // another seed, another town
+  double length_m = 0.0;   // of a drive; 0: all of it
+  double duration_s = 20.0;  // of a walk in the room
+  double speed = 1.0;      // times the usual
+  double noise = 1.0;      // times the usual noise of sensors
+  double scale = 1.0;      // times the usual size of images
+  std::string path;        // a drive along the poses of a KITTI file instead of through the town
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+// Reads "street", "street-short" or "room", and options behind it: "street,seed=3,length=500". Throws InputError.
+SimulationOptions ParseSimulation(const std::string& text);
+
+class Simulation {
+ public:
+  // Throws InputError.
+  Simulation(const SimulationOptions& options, SensorType sensor);
+  ~Simulation();
+
+  const CameraCalibration& calibration() const { return camera_; }
+  int64_t num_frames() const { return num_frames_; }
+  int64_t UtimeOf(FrameId frame) const;
+  Rigid3 WorldFromCamera(FrameId frame) const;
+  // Frames may be asked for in any order.
+  CameraFrame Render(FrameId frame);
+  // What is seen before the camera adds its faults.
+  void RenderPerfect(FrameId frame, Rendering& out);
+
+ private:
+  double TimeOf(FrameId frame) const;
+  CameraVelocity VelocityAt(double time_s) const;
+
+  SimulationOptions options_;
+  CameraCalibration camera_;
+  double frames_per_s_ = 10.0;
+  int64_t num_frames_ = 0;
+  std::unique_ptr<Trajectory> trajectory_;
+  std::unique_ptr<Renderer> renderer_;
+  std::unique_ptr<EffectsPipeline> effects_;
+  Rendering rendering_;
+};
+
+}  // namespace tessera

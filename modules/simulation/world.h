@@ -1,0 +1,77 @@
+// A world of textured parallelograms. World frame: y points down, the ground is y = 0.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "simulation/drive.h"
+#include "simulation/paint.h"
+#include "simulation/street_map.h"
+
+namespace tessera {
+
+// The points corner + a * across + b * up with a, b in [0, 1]. The paint's bottom left is at the corner. Seen from the
+// side from which `across` points to the right and `up` up; from the other too if two_sided.
+struct Surface {
+  Eigen::Vector3d corner;
+  Eigen::Vector3d across;
+  Eigen::Vector3d up;
+  int32_t paint = 0;          // index into World::paints
+  float brightness = 1.0F;    // of the light that falls on it
+  bool two_sided = false;
+
+  Eigen::Vector3d Centre() const { return corner + 0.5 * (across + up); }
+};
+
+// A car that drives along a line, against the camera's direction.
+struct MovingCar {
+  Polyline way;             // every kCarStepM
+  double start_m = 0.0;     // its place along the way at time 0
+  double speed_mps = 0.0;
+  std::vector<Surface> body;  // around the origin, facing +z
+};
+inline constexpr double kCarStepM = 0.5;
+
+struct World {
+  std::vector<PaintSpec> paints;
+  std::vector<Surface> surfaces;
+  std::vector<MovingCar> cars;
+  std::shared_ptr<const StreetMap> streets;  // null: a room
+  double sight_m = 260.0;                    // surfaces whose centre is farther are not drawn, but `far` ones are
+  std::vector<Surface> far;                  // sky and skyline
+};
+
+// Adds surfaces and their paints to a world.
+class WorldBuilder {
+ public:
+  explicit WorldBuilder(World& world) : world_(world) {}
+
+  int32_t AddPaint(const PaintSpec& spec);
+  // An upright wall from `from` to `to` (seen with `from` on the left), standing on height `bottom_m`.
+  Surface Wall(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double bottom_m, double height_m, int32_t paint) const;
+  // Four walls around the rectangle with this middle, half sizes along `ahead` and to its right, seen from outside.
+  // Paints: of the sides along `ahead`, and of the ends.
+  std::vector<Surface> Box(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, double half_length_m,
+                           double half_width_m, double bottom_m, double height_m, int32_t sides, int32_t ends) const;
+  // The box's lid.
+  Surface Lid(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, double half_length_m, double half_width_m,
+              double height_m, int32_t paint) const;
+  void Add(const Surface& surface) { world_.surfaces.push_back(surface); }
+  void Add(const std::vector<Surface>& surfaces);
+  World& world() { return world_; }
+
+ private:
+  World& world_;
+};
+
+// The body of a parked or driving car in the middle of `middle`, facing `ahead`.
+std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, uint32_t seed, WorldBuilder& builder);
+
+// Houses, trees, parked and driving cars along the streets; the drive stays free.
+World BuildStreets(const StreetPlan& plan, uint32_t seed);
+// A furnished room with its middle at the origin; x, height, z.
+World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);
+
+}  // namespace tessera

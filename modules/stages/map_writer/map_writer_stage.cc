@@ -1,0 +1,65 @@
+#include "stages/map_writer/map_writer_stage.h"
+
+#include <cstdio>
+
+#include "core/errors.h"
+#include "evaluation/map_text.h"
+#include "evaluation/run_files.h"
+
+namespace tessera {
+namespace {
+
+std::string PathFrom(const Settings& settings) {
+  auto path = settings.Get<std::string>("map_writer.path");
+  if (path.empty()) {
+    throw InputError("map_writer.path is empty: say where the map goes with --set map_writer.path=FILE.ply");
+  }
+  return path;
+}
+
+}  // namespace
+
+MapWriterStage::MapWriterStage(StageContext& context)
+    : context_(context),
+      path_(PathFrom(context.settings())),
+      follows_(context.settings().Get<bool>("map_writer.follow")),
+      map_(context, true, [this] { OnDeltas(); }) {
+  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
+    if (end.stage != "mapper") return;
+    mapper_end_ = end;
+    map_.Expect(end.num_values);
+    WriteIfDone();
+  });
+}
+
+void MapWriterStage::OnDeltas() {
+  for (const auto& delta : map_.Take()) {
+    if (const std::string problem = replica_.Apply(*delta); !problem.empty()) {
+      map_.Reject(problem);
+      return;
+    }
+    context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));
+  }
+  WriteIfDone();
+}
+
+// Each delta brought the owner's hash, and Apply() compared it: a replica that is not rejected has the owner's map.
+void MapWriterStage::WriteIfDone() {
+  const bool is_last = mapper_end_ && replica_.next_delta() >= mapper_end_->num_values;
+  const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
+  if (context_.finished() || !is_there || (follows_ && !is_last)) return;
+  try {
+    WriteFile(path_, PlyText(replica_));
+  } catch (const InputError& error) {
+    context_.Fail(error.what(), 2);
+    return;
+  }
+  std::printf("map after delta %lld: %lld keyframes, %lld landmarks, hash %016llx as the mapper's, SHA-256 %s\n",
+              static_cast<long long>(replica_.next_delta() - 1), static_cast<long long>(replica_.keyframes().size()),
+              static_cast<long long>(replica_.landmarks().size()), static_cast<unsigned long long>(replica_.hash()),
+              replica_.Sha256Hex().c_str());
+  std::fflush(stdout);
+  context_.Finish();
+}
+
+}  // namespace tessera

@@ -1,0 +1,31 @@
+// Wiring of the map writer: joins a running stack at any time, follows the map, and writes it as a cloud of points.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "geometry/camera_frame.h"
+#include "map/map.h"
+#include "transport/map_subscription.h"
+#include "transport/stage.h"
+
+namespace tessera {
+
+class MapWriterStage {
+ public:
+  // Throws InputError if no path is given.
+  explicit MapWriterStage(StageContext& context);
+
+ private:
+  void OnDeltas();
+  void WriteIfDone();
+
+  StageContext& context_;
+  const std::string path_;
+  const bool follows_;
+  MapSubscription map_;
+  Map replica_;
+  std::optional<EndOfStream> mapper_end_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,105 @@
+// MAP_DELTA, MAP_SNAPSHOT, MAP_REQUEST.
+#include <algorithm>
+
+#include "map/map_exchange.h"
+#include "tessera/map_delta_t.hpp"
+#include "tessera/map_request_t.hpp"
+#include "tessera/map_snapshot_t.hpp"
+#include "transport/codec_impl.h"
+#include "transport/codec_map_change.h"
+#include "transport/codec_parts.h"
+
+namespace tessera {
+namespace {
+
+// What a delta and a page of a snapshot have in common.
+template <class Message, class Emit>
+void CutParts(const MapDelta& delta, Message* message, size_t max_bytes, Emit emit) {
+  message->number = delta.number;
+  message->answers = delta.answers.value;
+  message->hash = static_cast<int64_t>(delta.hash);
+  const auto overhead = static_cast<size_t>(message->getEncodedSize());
+  ChangeCutter cutter(delta);
+  do {
+    cutter.Fill(max_bytes - std::min(max_bytes, overhead), &message->change);
+    emit(*message);
+  } while (!cutter.done());
+}
+
+template <class Message>
+std::string JoinPart(const Message& message, MapDelta* delta) {
+  if (message.header.part == 0) {
+    *delta = {};
+    delta->number = message.number;
+    delta->answers.value = message.answers;
+    delta->hash = static_cast<uint64_t>(message.hash);
+  }
+  if (message.number < 0 || message.answers < -1 || message.number != delta->number) {
+    return "its number is out of range, or its parts do not fit together";
+  }
+  return JoinChange(message.change, message.header.part + 1 == message.header.num_parts, delta);
+}
+
+}  // namespace
+
+template <>
+struct Codec<MapDelta> {
+  using Message = map_delta_t;
+  static constexpr const char* kTypeName = "map_delta_t";
+
+  // A snapshot does not travel as one delta, but page by page.
+  template <class Emit>
+  static void Cut(const MapDelta& delta, Message* message, size_t max_bytes, Emit emit) {
+    CutParts(delta, message, max_bytes, emit);
+  }
+  static std::string Join(const Message& message, MapDelta* delta) { return JoinPart(message, delta); }
+};
+TESSERA_CODEC(MapDelta);
+
+template <>
+struct Codec<MapSnapshotPage> {
+  using Message = map_snapshot_t;
+  static constexpr const char* kTypeName = "map_snapshot_t";
+
+  template <class Emit>
+  static void Cut(const MapSnapshotPage& page, Message* message, size_t max_bytes, Emit emit) {
+    message->page = page.page;
+    message->num_pages = page.num_pages;
+    CutParts(page.part, message, max_bytes, emit);
+  }
+  static std::string Join(const Message& message, MapSnapshotPage* page) {
+    page->page = message.page;
+    page->num_pages = message.num_pages;
+    const std::string problem = JoinPart(message, &page->part);
+    page->part.is_snapshot = true;
+    const map_change_t& change = message.change;
+    const bool is_plain = change.num_moved_keyframes == 0 && change.num_removed_observations == 0 &&
+                          change.num_changed_parents == 0 && change.num_removed_landmarks == 0 &&
+                          change.num_removed_keyframes == 0;
+    return FirstProblem({Require(message.page >= 0 && message.page < message.num_pages, "its page is out of range"),
+                         Require(is_plain, "a snapshot takes nothing back"), problem});
+  }
+};
+TESSERA_CODEC(MapSnapshotPage);
+
+template <>
+struct Codec<MapRequest> {
+  using Message = map_request_t;
+  static constexpr const char* kTypeName = "map_request_t";
+
+  template <class Emit>
+  static void Cut(const MapRequest& request, Message* message, size_t, Emit emit) {
+    message->next_delta = request.next_delta;
+    message->snapshot = request.snapshot;
+    message->page = request.page;
+    emit(*message);
+  }
+  static std::string Join(const Message& message, MapRequest* request) {
+    *request = {.next_delta = message.next_delta, .snapshot = message.snapshot, .page = message.page};
+    return Require(message.next_delta >= -1 && message.snapshot >= -1 && message.page >= 0,
+                   "one of its numbers is out of range");
+  }
+};
+TESSERA_CODEC(MapRequest);
+
+}  // namespace tessera

@@ -1,0 +1,67 @@
+"""tessera map: a late listener that asks the mapper for the map, follows it, and writes it as a cloud of points."""
+
+import os
+import tempfile
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from tessera_cli import settings
+from tessera_cli.bus import BusListener
+from tessera_cli.errors import RunFailed, UserError
+from tessera_cli.files import BIN
+from tessera_cli.interrupt import Interrupt
+from tessera_cli.processes import StageProcess, describe_exit
+from tessera_cli.progress import FINISHED
+
+# A living stage tells its status twice a second.
+SILENT_BUS_S = 5.0
+LISTEN_MS = 50
+
+
+def main(arguments: Namespace) -> int:
+    path = Path(arguments.path).expanduser().absolute()
+    if path.is_dir() or not path.parent.is_dir():
+        raise UserError(f"{path} can't be written: name a file in a folder that exists.")
+    assignments = settings.port_assignments(arguments.port) + [
+        f"map_writer.path={path}", f"map_writer.follow={str(arguments.follow).lower()}"]
+    with tempfile.TemporaryDirectory(prefix="tessera-map-") as folder:
+        values = settings.write_settings(assignments, Path(folder) / "settings.yaml")
+        _write_map(values, Path(folder))
+    print(f"tessera: the map is in {path}")
+    return 0
+
+
+def _write_map(values: dict, folder: Path) -> None:
+    # Several may listen at once, each under a name of its own.
+    command = [str(BIN / "tessera-map-writer"), "--settings", str(folder / "settings.yaml"), "--name", f"map_writer_{os.getpid()}"]
+    writer = StageProcess("map_writer", command, folder / "map_writer.log")
+    bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], lambda pid: pid in writer.pids)
+    if bus.is_free():
+        raise UserError("no stack runs on this bus: start one, or give its --port N.")
+    interrupt = Interrupt()
+    writer.start()
+    try:
+        status = _wait(writer, bus, interrupt)
+    finally:
+        writer.kill()
+    if status == 2:
+        raise UserError(f"map_writer: {writer.last_words()}")
+    if status != 0:
+        raise RunFailed(f"map_writer {describe_exit(status)}: {writer.last_words()}")
+    print(f"tessera: {writer.last_words()}", flush=True)
+
+
+def _wait(writer: StageProcess, bus: BusListener, interrupt: Interrupt) -> int:
+    """The exit status; 0 when the map is written."""
+    began = time.monotonic()
+    while (status := writer.poll()) is None:
+        bus.listen(LISTEN_MS)
+        report = next(iter(bus.progress.stages.values()), None)
+        if report is not None and report.state == FINISHED:
+            return 0
+        if interrupt.requested:
+            raise RunFailed("interrupted before the map was written.")
+        if time.monotonic() - max(began, bus.others_heard_at) > SILENT_BUS_S:
+            raise RunFailed("the stack has ended before the whole map was here.")
+    return status

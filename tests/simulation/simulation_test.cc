@@ -1,0 +1,167 @@
+// A simulated world is the same every time, and its images, depths and poses tell one story.
+#include "simulation/simulation.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "core/errors.h"
+#include "core/sha256.h"
+
+namespace tessera {
+namespace {
+
+SimulationOptions Small(const std::string& name) { return ParseSimulation(name + ",scale=0.3"); }
+
+std::string HashOfFrame(const CameraFrame& frame) {
+  Sha256 hash;
+  for (const GrayImage* image : {&frame.left, &frame.right}) hash.Add(image->pixels.data(), image->pixels.size());
+  hash.Add(frame.depth.pixels.data(), frame.depth.pixels.size() * sizeof(uint16_t));
+  return hash.HexDigest();
+}
+
+struct Scene {
+  const char* name;
+  SensorType sensor;
+};
+constexpr Scene kScenes[] = {{"street", SensorType::kStereo}, {"street-short", SensorType::kMono}, {"room", SensorType::kRgbd}};
+
+TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
+  for (const Scene& scene : kScenes) {
+    Simulation first(Small(scene.name), scene.sensor);
+    Simulation second(Small(scene.name), scene.sensor);
+    const std::string expected = HashOfFrame(first.Render(FrameId{40}));
+    EXPECT_EQ(HashOfFrame(first.Render(FrameId{40})), expected) << scene.name;
+    second.Render(FrameId{200});
+    second.Render(FrameId{3});
+    EXPECT_EQ(HashOfFrame(second.Render(FrameId{40})), expected) << scene.name;
+    EXPECT_NE(HashOfFrame(second.Render(FrameId{41})), expected) << scene.name;
+  }
+}
+
+TEST(Simulation, AnotherProcessRendersTheSame) {
+  int pipe_ends[2];
+  ASSERT_EQ(pipe(pipe_ends), 0);
+  const auto hash = [] { return HashOfFrame(Simulation(Small("street-short"), SensorType::kStereo).Render(FrameId{17})); };
+  const pid_t child = fork();
+  if (child == 0) {
+    const std::string own = hash();
+    _exit(write(pipe_ends[1], own.data(), own.size()) == static_cast<ssize_t>(own.size()) ? 0 : 1);
+  }
+  const std::string expected = hash();
+  std::string received(expected.size(), ' ');
+  ASSERT_EQ(read(pipe_ends[0], received.data(), received.size()), static_cast<ssize_t>(expected.size()));
+  waitpid(child, nullptr, 0);
+  EXPECT_EQ(received, expected);
+}
+
+TEST(Simulation, SeedsMakeDifferentWorlds) {
+  Simulation one(Small("street,seed=1"), SensorType::kMono);
+  Simulation two(Small("street,seed=2"), SensorType::kMono);
+  EXPECT_NE(HashOfFrame(one.Render(FrameId{0})), HashOfFrame(two.Render(FrameId{0})));
+}
+
+// Grey value (0..255) and inverse depth between pixels.
+struct Sample {
+  double grey, inverse_depth, contrast;
+};
+Sample SampleAt(const Rendering& r, const Eigen::Vector2d& p) {
+  const int x = static_cast<int>(p.x()), y = static_cast<int>(p.y());
+  const double u = p.x() - x, v = p.y() - y;
+  const auto grey = [&](int i, int j) { return r.radiance.row(y + j)[x + i] / 256.0; };
+  const double low = std::min({grey(0, 0), grey(1, 0), grey(0, 1), grey(1, 1)});
+  const double high = std::max({grey(0, 0), grey(1, 0), grey(0, 1), grey(1, 1)});
+  return {(1 - v) * ((1 - u) * grey(0, 0) + u * grey(1, 0)) + v * ((1 - u) * grey(0, 1) + u * grey(1, 1)),
+          static_cast<double>(r.inverse_depth.row(static_cast<int>(std::lround(p.y())))[static_cast<int>(std::lround(p.x()))]),
+          high - low};
+}
+
+// Sends every pixel of one picture by its depth into another; where the other sees the same place, it must see the same
+// grey, but for what lies between its own pixels. Returns the share of pixels that were compared.
+double ExpectSameGrey(const CameraCalibration& camera, const Rendering& from, const Rendering& to, const Rigid3& to_from_from) {
+  int num_compared = 0, num_different = 0;
+  double sum_squared = 0.0;
+  for (int y = 0; y < camera.height_px; ++y) {
+    for (int x = 0; x < camera.width_px; ++x) {
+      const double w = static_cast<double>(from.inverse_depth.row(y)[x]);
+      if (w <= 0.0) continue;
+      const Eigen::Vector3d point = to_from_from * (camera.Ray(Eigen::Vector2d(x, y)) / w);
+      if (point.z() < 0.2) continue;
+      const Eigen::Vector2d p = camera.Project(point);
+      if (p.x() < 1 || p.y() < 1 || p.x() > camera.width_px - 3 || p.y() > camera.height_px - 3) continue;
+      const Sample sample = SampleAt(to, p);
+      if (std::abs(sample.inverse_depth * point.z() - 1.0) > 0.02) continue;  // hidden by something nearer
+      const double difference = sample.grey - from.radiance.row(y)[x] / 256.0;
+      ++num_compared;
+      sum_squared += difference * difference;
+      num_different += std::abs(difference) > 8.0 + sample.contrast ? 1 : 0;
+    }
+  }
+  EXPECT_LT(std::sqrt(sum_squared / num_compared), 12.0);
+  EXPECT_LT(num_different, num_compared / 25);
+  return static_cast<double>(num_compared) / (camera.width_px * camera.height_px);
+}
+
+TEST(Simulation, DepthAndPoseExplainTheNextImage) {
+  for (const Scene& scene : kScenes) {
+    Simulation simulation(ParseSimulation(scene.name), scene.sensor);
+    for (const int64_t number : {10, 130, 300}) {
+      Rendering from, to;
+      simulation.RenderPerfect(FrameId{number}, from);
+      simulation.RenderPerfect(FrameId{number + 1}, to);
+      const Rigid3 to_from_from = simulation.WorldFromCamera(FrameId{number + 1}).Inverse() * simulation.WorldFromCamera(FrameId{number});
+      EXPECT_GT(ExpectSameGrey(simulation.calibration(), from, to, to_from_from), 0.5) << scene.name << " " << number;
+    }
+  }
+}
+
+TEST(Simulation, NoiseIsAsOrdered) {
+  Simulation quiet(ParseSimulation("room,noise=0,scale=0.5"), SensorType::kMono);
+  Simulation noisy(ParseSimulation("room,noise=2,scale=0.5"), SensorType::kMono);
+  const GrayImage a = quiet.Render(FrameId{5}).left;
+  const GrayImage b = noisy.Render(FrameId{5}).left;
+  double sum = 0.0, sum_squared = 0.0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) {
+    const double difference = static_cast<double>(b.pixels[i]) - static_cast<double>(a.pixels[i]);
+    sum += difference;
+    sum_squared += difference * difference;
+  }
+  const auto num = static_cast<double>(a.pixels.size());
+  EXPECT_NEAR(sum / num, 0.0, 0.1);
+  // Read noise 2.6, and shot noise of about 0.048 per grey value of some 100.
+  EXPECT_NEAR(std::sqrt(sum_squared / num), std::sqrt(2.6 * 2.6 + 0.048 * 100.0), 0.6);
+}
+
+TEST(Simulation, TheDriveKeepsItsDistance) {
+  Simulation simulation(Small("street"), SensorType::kMono);
+  EXPECT_GE(simulation.num_frames(), 2000);
+  Rendering rendering;
+  for (int64_t frame = 0; frame < simulation.num_frames(); frame += 97) {
+    simulation.RenderPerfect(FrameId{frame}, rendering);
+    const float nearest = *std::max_element(rendering.inverse_depth.pixels.begin(), rendering.inverse_depth.pixels.end());
+    EXPECT_LT(nearest, 1.0F / 1.2F) << frame;
+    const Rigid3 step = simulation.WorldFromCamera(FrameId{frame}).Inverse() * simulation.WorldFromCamera(FrameId{std::min(frame + 1, simulation.num_frames() - 1)});
+    EXPECT_LT(step.translation.norm(), 0.9) << frame;
+  }
+}
+
+TEST(ParseSimulation, ReadsOptions) {
+  const SimulationOptions options = ParseSimulation("street-short,seed=7,length=120.5,speed=2");
+  EXPECT_EQ(options.scene, SimulationOptions::Scene::kStreetShort);
+  EXPECT_EQ(options.seed, 7U);
+  EXPECT_EQ(options.length_m, 120.5);
+  EXPECT_EQ(options.speed, 2.0);
+}
+
+TEST(ParseSimulation, RefusesNonsense) {
+  for (const char* text : {"", "moon", "street,", "street,seed", "street,seed=x", "street,seed=-1", "street,speed=0",
+                           "street,noise=-1", "street,scale=100", "room,colour=1", "street,length=nan", "street,seed=3 "}) {
+    EXPECT_THROW(ParseSimulation(text), InputError) << text;
+  }
+  EXPECT_THROW(Simulation(ParseSimulation("street,path=/nowhere"), SensorType::kMono), InputError);
+}
+
+}  // namespace
+}  // namespace tessera
