@@ -41,7 +41,7 @@ Descriptor Medoid(const std::vector<Descriptor>& descriptors) {
 
 }  // namespace
 
-Landmark DescribeLandmark(const Map& map, LandmarkId id) {
+Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   Landmark landmark = *map.FindLandmark(id);
   const std::vector<Observation>& observations = map.ObservationsOf(id);
   landmark.normal = MeanDirection(map, landmark.position_in_world, observations);
@@ -52,7 +52,12 @@ Landmark DescribeLandmark(const Map& map, LandmarkId id) {
   constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;
   landmark.max_distance = distance * std::pow(kLevelScale, keypoint.level);
   landmark.min_distance = landmark.max_distance / std::pow(kLevelScale, kTopLevel);
+  return landmark;
+}
 
+Landmark DescribeLandmark(const Map& map, LandmarkId id) {
+  Landmark landmark = DescribeMovedLandmark(map, id);
+  const std::vector<Observation>& observations = map.ObservationsOf(id);
   std::vector<Descriptor> descriptors;
   const size_t first = observations.size() > kMaxDescriptors ? observations.size() - kMaxDescriptors : 0;
   for (size_t i = first; i < observations.size(); ++i) {

@@ -15,6 +15,9 @@ namespace tessera {
 // (the medoid, as in ORB-SLAM: Mur-Artal et al. 2015); ties go to the older keyframe. To bound the work, at most the
 // newest kMaxDescriptors observations count for it.
 Landmark DescribeLandmark(const Map& map, LandmarkId id);
+// The same for a landmark whose observations are those that its descriptor was chosen from: it keeps the descriptor, which
+// is most of the work.
+Landmark DescribeMovedLandmark(const Map& map, LandmarkId id);
 
 inline constexpr int kMaxDescriptors = 12;
 

@@ -90,12 +90,14 @@ void MapEditor::AddObservation(LandmarkId landmark, const Observation& observati
   Apply({.new_observations = {{landmark, observation}}});
   ++observations_[{landmark, observation}];
   touched_.insert(landmark);
+  reobserved_.insert(landmark);
 }
 
 void MapEditor::RemoveObservation(LandmarkId landmark, const Observation& observation) {
   Apply({.removed_observations = {{landmark, observation}}});
   --observations_[{landmark, observation}];
   touched_.insert(landmark);
+  reobserved_.insert(landmark);
 }
 
 MapDelta MapEditor::Finish(KeyframeId answers) {

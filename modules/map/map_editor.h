@@ -40,6 +40,8 @@ class MapEditor {
 
   // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
   const std::set<LandmarkId>& touched_landmarks() const { return touched_; }
+  // Whether an observation of the landmark came or went.
+  bool IsReobserved(LandmarkId id) const { return reobserved_.contains(id); }
 
   // The delta of all edits. The editor must not be used after it.
   MapDelta Finish(KeyframeId answers);
@@ -51,7 +53,7 @@ class MapEditor {
   const int64_t number_;
   std::map<KeyframeId, MapDelta::NewKeyframe> new_keyframes_;
   std::set<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
-  std::set<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_;
+  std::set<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_, reobserved_;
   std::map<std::pair<LandmarkId, Observation>, int> observations_;  // +1: new, -1: removed, 0: taken back
 };
 

@@ -17,13 +17,16 @@ double Median(std::vector<double> values) {
 }  // namespace
 
 std::string KeyframeDecisionOptions::Check() const {
-  if (!(min_share > 0.0 && min_share < 1.0)) return "tracker.min_reference_share must be between 0 and 1";
+  for (const double share : {min_share, min_first_share, min_still_share}) {
+    if (!(share > 0.0 && share < 1.0)) return "the tracker's shares of a reference's points must be between 0 and 1";
+  }
   if (!(min_parallax_rad > 0.0) || max_interval_us < 1) return "the limits of keyframes must be positive";
   return "";
 }
 
 void KeyframeDecision::Restart(const TrackedFrame& frame) {
   utime_us_ = frame.view->features().utime_us;
+  first_utime_us_.reset();
   points_.clear();
   for (const SeenPoint& point : frame.points) {
     if (point.valid()) points_.push_back(point.id);
@@ -37,25 +40,46 @@ void KeyframeDecision::Renew(const MapReplica& replica) {
   std::sort(points_.begin(), points_.end());
 }
 
-bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_us,
-                              const Rigid3& world_from_reference, int num_near_known, int num_near_new) const {
+KeyframeDecision::Seen KeyframeDecision::See(const TrackedFrame& frame, const Rigid3& world_from_reference) const {
+  Seen seen;
   std::vector<double> cosines;
   for (const SeenPoint& point : frame.points) {
     if (!point.valid() || !std::binary_search(points_.begin(), points_.end(), point.id)) continue;
+    seen.points.push_back(point.id);
     cosines.push_back(CosParallax(point.landmark.position_in_world, world_from_reference.translation,
                                   frame.world_from_camera.translation));
   }
-  if (cosines.empty() || points_.empty()) return true;
-  const double share = static_cast<double>(cosines.size()) / static_cast<double>(points_.size());
-  const double elapsed_us = static_cast<double>(std::max<int64_t>(1, frame.view->features().utime_us - utime_us_));
-  // What is seen falls about linearly: share(t) = 1 - (1 - share) t / elapsed, taken one frame ahead.
-  const double next_share = share - (1.0 - share) * static_cast<double>(frame_interval_us) / elapsed_us;
-  const double parallax_rad = std::acos(std::clamp(Median(cosines), -1.0, 1.0));
-  const bool lacks_near = num_near_known < options_.max_known_points && num_near_new > options_.min_new_points;
-  const bool is_old = elapsed_us > static_cast<double>(options_.max_interval_us) && share < options_.min_still_share;
-  const bool lacks_points = frame.NumPoints() < options_.min_points && share < options_.min_still_share;
-  return lacks_points || next_share < options_.min_share || lacks_near || is_old ||
-         (parallax_rad > options_.min_parallax_rad && share < options_.min_still_share);
+  std::sort(seen.points.begin(), seen.points.end());
+  if (!cosines.empty()) seen.median_parallax_rad = std::acos(std::clamp(Median(std::move(cosines)), -1.0, 1.0));
+  return seen;
+}
+
+// What is seen falls about linearly from the frame after the reference: share(t) = 1 - slope (t - first), taken one frame
+// ahead.
+double KeyframeDecision::NextShare(double share, int64_t utime_us, int64_t frame_interval_us) const {
+  const auto elapsed_us = static_cast<double>(std::max<int64_t>(1, utime_us - *first_utime_us_));
+  return share - (1.0 - share) * std::min(1.0, static_cast<double>(frame_interval_us) / elapsed_us);
+}
+
+bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_us,
+                              const Rigid3& world_from_reference, const NearKeypoints& near) {
+  Seen seen = See(frame, world_from_reference);
+  if (seen.points.empty()) return true;
+  const int64_t utime_us = frame.view->features().utime_us;
+  const double share = static_cast<double>(seen.points.size()) / static_cast<double>(points_.size());
+  const bool is_first = !first_utime_us_;
+  if (is_first) {
+    first_utime_us_ = utime_us;
+    points_ = std::move(seen.points);
+  }
+  const bool has_lost_sight = is_first ? share < options_.min_first_share
+                                       : NextShare(share, utime_us, frame_interval_us) < options_.min_share;
+  const bool lacks_near = near.num_known < options_.max_known_points && near.num_new > options_.min_new_points;
+  const bool has_moved = share < options_.min_still_share;
+  const bool is_old = utime_us - utime_us_ > options_.max_interval_us;
+  const bool lacks_points = frame.NumPoints() < options_.min_points;
+  const bool has_parallax = frame.view->baseline_m() == 0.0 && seen.median_parallax_rad > options_.min_parallax_rad;
+  return has_lost_sight || lacks_near || (has_moved && (is_old || lacks_points || has_parallax));
 }
 
 }  // namespace tessera

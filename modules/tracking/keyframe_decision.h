@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,11 +12,15 @@
 namespace tessera {
 
 struct KeyframeDecisionOptions {
-  double min_share = 0.5;           // of the reference's points that must still be seen at the next frame
-  double min_parallax_rad = 0.035;  // 2 degrees of median parallax to the reference: new points can be placed well
-  double min_still_share = 0.9;     // parallax alone is no reason while more than this is still seen
+  // Of the reference's points that were found in the frame after it, this share must still be seen at the next frame.
+  double min_share = 0.6;
+  // Of all the reference's points, this share must be found in the frame after it. Corners come and go: a loss of a
+  // third from frame to frame is nothing to act on, a greater one is motion.
+  double min_first_share = 0.4;
+  double min_parallax_rad = 0.035;  // mono: 2 degrees of median parallax to the reference: new points can be placed well
+  double min_still_share = 0.9;     // few points, parallax or age is no reason while more than this is still seen
   int min_points = 150;             // a frame that sees fewer known points becomes a keyframe if anything moved
-  int64_t max_interval_us = 2000000;  // moving or not, not longer than this, if anything moved
+  int64_t max_interval_us = 2000000;  // not longer than this, if anything moved
   int min_new_points = 70;          // stereo, RGB-D: near keypoints that see no known point ...
   int max_known_points = 100;       // ... while fewer near keypoints than this see one
 
@@ -27,18 +32,33 @@ class KeyframeDecision {
  public:
   explicit KeyframeDecision(const KeyframeDecisionOptions& options) : options_(options) {}
 
+  // Near keypoints that see a known point, and that see none (stereo, RGB-D).
+  struct NearKeypoints {
+    int num_known = 0;
+    int num_new = 0;
+  };
+
   // `frame` became the reference.
   void Restart(const TrackedFrame& frame);
   // The reference's points got new names (MapReplica::Renew).
   void Renew(const MapReplica& replica);
-  // `num_near_known`, `num_near_new`: near keypoints that see a known point, and that see none (mono: 0).
+  // To be asked of every tracked frame after the reference, in order. `frame_interval_us`: to the frame before.
   bool Decide(const TrackedFrame& frame, int64_t frame_interval_us, const Rigid3& world_from_reference,
-              int num_near_known, int num_near_new) const;
+              const NearKeypoints& near);
 
  private:
+  // What the frame sees of the reference's points.
+  struct Seen {
+    std::vector<PointId> points;  // sorted
+    double median_parallax_rad = 0.0;
+  };
+  Seen See(const TrackedFrame& frame, const Rigid3& world_from_reference) const;
+  double NextShare(double share, int64_t utime_us, int64_t frame_interval_us) const;
+
   const KeyframeDecisionOptions options_;
-  int64_t utime_us_ = 0;
-  std::vector<PointId> points_;  // that the reference saw, sorted
+  int64_t utime_us_ = 0;                        // of the reference
+  std::optional<int64_t> first_utime_us_;       // of the frame after it, once that was asked
+  std::vector<PointId> points_;  // sorted: that the reference saw; later, those of them that the frame after it saw
 };
 
 }  // namespace tessera

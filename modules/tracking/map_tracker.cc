@@ -259,18 +259,18 @@ void MapTracker::NoteLoss(int64_t utime_us) {
   initializer_ = MonoInitializer(options_.start);
 }
 
-bool MapTracker::IsKeyframeDue() const {
+bool MapTracker::IsKeyframeDue() {
   const TrackedFrame& frame = last_->frame;
   const double near_m = options_.max_depth_baselines * frame.view->baseline_m();
-  int num_near_known = 0, num_near_new = 0;
+  KeyframeDecision::NearKeypoints near;
   for (int i = 0; near_m > 0.0 && i < frame.view->size(); ++i) {
     const auto point = PointFromDepth(frame.view->features(), i);
     if (!point || point->z() > near_m) continue;
-    (frame.points[Index(i)].valid() ? num_near_known : num_near_new) += 1;
+    (frame.points[Index(i)].valid() ? near.num_known : near.num_new) += 1;
   }
   const Rigid3 world_from_reference = frame.world_from_camera * last_->reference_from_camera.Inverse();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
-  return decision_.Decide(frame, interval_us, world_from_reference, num_near_known, num_near_new);
+  return decision_.Decide(frame, interval_us, world_from_reference, near);
 }
 
 // The frame becomes the reference of those to come.

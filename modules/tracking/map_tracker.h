@@ -78,7 +78,7 @@ class MapTracker {
   PlacedPoints LocalPoints(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame);
   void NoteLoss(int64_t utime_us);
-  bool IsKeyframeDue() const;
+  bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
   void PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
 

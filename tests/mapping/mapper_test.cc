@@ -111,6 +111,20 @@ TEST(Mapper, StereoBuildsAMapFromDepthUnderNoise) {
   });
 }
 
+TEST(Mapper, TheDoubleWindowCorrectsPosesToo) {
+  SyntheticWorld world(SensorType::kStereo, 0.5);
+  Drive drive(world, 0.02, 2);
+  MapperOptions options;
+  options.window.is_double = true;
+  options.window.max_inner_keyframes = 4;  // so that some keyframes stand outside
+  Mapper mapper(options);
+  for (int64_t step = 0; step < 12; ++step) (void)mapper.Process(drive.Next(step));
+  mapper.map().keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
+    const Rigid3 truth = world.Pose(static_cast<double>(keyframe.features->frame.value));
+    EXPECT_LT(CenterError(keyframe.world_from_camera, truth), 0.06);
+  });
+}
+
 TEST(Mapper, SameKeyframesMakeTheSameDeltasAndReplicasFollow) {
   SyntheticWorld world(SensorType::kStereo, 0.5);
   Drive drive(world, 0.02, 2);

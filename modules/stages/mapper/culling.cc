@@ -22,15 +22,18 @@ bool IsWellSeen(const Map& map, LandmarkId landmark, KeyframeId own, int level, 
 
 bool IsRedundant(const Map& map, KeyframeId id, const CullingOptions& options) {
   const Keyframe& keyframe = *map.FindKeyframe(id);
-  int num_landmarks = 0, num_well_seen = 0;
+  const auto num_landmarks = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(),
+                                           [](LandmarkId landmark) { return landmark.valid(); });
+  const double min_well_seen = options.redundant_share * static_cast<double>(num_landmarks);
+  auto num_well_seen = num_landmarks;  // but for those found not to be
   for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
     const LandmarkId landmark = keyframe.landmarks[i];
     if (!landmark.valid()) continue;
-    ++num_landmarks;
     const int level = keyframe.features->keypoints[i].level;
-    num_well_seen += IsWellSeen(map, landmark, id, level, options.redundant_observers) ? 1 : 0;
+    num_well_seen -= IsWellSeen(map, landmark, id, level, options.redundant_observers) ? 0 : 1;
+    if (static_cast<double>(num_well_seen) <= min_well_seen) return false;  // most keyframes, after a few landmarks
   }
-  return num_well_seen > options.redundant_share * num_landmarks;
+  return num_landmarks > 0;
 }
 
 }  // namespace

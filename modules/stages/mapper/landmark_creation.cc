@@ -1,6 +1,7 @@
 #include "stages/mapper/landmark_creation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "geometry/triangulation.h"
@@ -47,7 +48,19 @@ class PairSearch {
         calibration_(first_.features->calibration), baseline_m_(Baseline(calibration_)),
         second_from_first_(second_.world_from_camera.Inverse() * first_.world_from_camera),
         rotation_(second_from_first_.rotation.toRotationMatrix()), roll_(RollBetween(second_from_first_)),
-        max_inverse_depth_(1.0 / min_depth), grid_(MakeGrid(*second_.features)) {}
+        max_inverse_depth_(1.0 / min_depth) {
+    for (int level = 0; level < kMaxLevels; ++level) {
+      limits_px_[static_cast<size_t>(level)] = std::sqrt(kLineChi2) * ScaleOfLevel(level);
+    }
+    // Only what sees no landmark yet is looked for.
+    std::vector<Keypoint> keypoints;
+    for (size_t i = 0; i < second_.landmarks.size(); ++i) {
+      if (second_.landmarks[i].valid()) continue;
+      keypoints.push_back(second_.features->keypoints[i]);
+      free_.push_back(static_cast<int32_t>(i));
+    }
+    grid_ = FeatureGrid(keypoints, calibration_.width_px, calibration_.height_px);
+  }
 
   // The keypoint of the second keyframe that sees the same point, and the point in the first camera's frame.
   struct Match {
@@ -76,7 +89,9 @@ class PairSearch {
   const Eigen::Matrix3d rotation_;
   const uint8_t roll_;
   const double max_inverse_depth_;
-  const FeatureGrid grid_;
+  std::array<double, kMaxLevels> limits_px_;  // by level: how far from the line a keypoint may lie
+  std::vector<int32_t> free_;                 // keypoints of the second keyframe that see no landmark
+  FeatureGrid grid_;                          // of these, by their number in free_
 };
 
 // A disparity d +- 3 sigma stands for inverse depths (d +- 3 sigma) / (fx baseline).
@@ -118,12 +133,13 @@ std::optional<int32_t> PairSearch::BestOnLine(int32_t keypoint, const PixelObser
   int best_distance = options_.max_hamming + 1, second_distance = 257;
   int32_t best = -1;
   Eigen::Vector2d best_px = Eigen::Vector2d::Zero();
-  const double margin_px = std::sqrt(kLineChi2) * ScaleOfLevel(kTopLevel);
-  grid_.VisitSegment(a, b, margin_px, [&](int32_t candidate) {
+  const double margin_px = limits_px_[static_cast<size_t>(std::min(kTopLevel, from.level + 2))];
+  grid_.VisitSegment(a, b, margin_px, [&](int32_t number) {
+    const int32_t candidate = free_[Index(number)];
     const Keypoint& to = second_.features->keypoints[Index(candidate)];
     if (second_.landmarks[Index(candidate)].valid() || std::abs(int{to.level} - int{from.level}) > 2) return;
     const Eigen::Vector2d offset = Eigen::Vector2d(to.x_px, to.y_px) - a;
-    const double limit = std::sqrt(kLineChi2) * ScaleOfLevel(to.level);
+    const double limit = limits_px_[std::min<size_t>(to.level, kMaxLevels - 1)];
     const double place = unit.dot(offset), aside = unit.x() * offset.y() - unit.y() * offset.x();
     if (std::abs(aside) > limit || place < -limit || place > length + limit) return;
     if (!AreAnglesNear(from.angle, to.angle, roll_)) return;

@@ -1,13 +1,15 @@
 #include "stages/mapper/local_adjustment.h"
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "tracking/landmark_view.h"
 
 namespace tessera {
 namespace {
 
-void AddPoses(const Map& map, const LocalWindow& window, BundleProblem& problem) {
+void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleProblem& problem) {
   const auto add = [&](KeyframeId id, bool is_fixed) {
     problem.poses.push_back({id, map.FindKeyframe(id)->world_from_camera.Inverse(), is_fixed});
   };
@@ -15,7 +17,7 @@ void AddPoses(const Map& map, const LocalWindow& window, BundleProblem& problem)
     add(id, !map.FindKeyframe(id)->parent.valid());
   }
   for (const KeyframeId id : window.outer) {
-    add(id, true);
+    add(id, !is_double || id == window.outer.front());
   }
   const auto num_fixed = std::count_if(problem.poses.begin(), problem.poses.end(),
                                        [](const BundlePose& pose) { return pose.is_fixed; });
@@ -29,18 +31,66 @@ int PoseIndex(const BundleProblem& problem, const std::vector<size_t>& by_id, Ke
   return place != by_id.end() && problem.poses[*place].id == id ? static_cast<int>(*place) : -1;
 }
 
-void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, BundleProblem& problem) {
-  std::vector<size_t> by_id(problem.poses.size());
+// The observations of the first `num_observers` poses; landmarks that have fewer than two are left out.
+void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size_t num_observers,
+                  BundleProblem& problem) {
+  std::vector<size_t> by_id(num_observers);
   for (size_t i = 0; i < by_id.size(); ++i) by_id[i] = i;
   std::sort(by_id.begin(), by_id.end(), [&](size_t a, size_t b) { return problem.poses[a].id < problem.poses[b].id; });
   for (const LandmarkId id : landmarks) {
     const int point = static_cast<int>(problem.points.size());
-    problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
+    const size_t num_before = problem.observations.size();
     for (const Observation& observation : map.ObservationsOf(id)) {
       const int pose = PoseIndex(problem, by_id, observation.keyframe);
       if (pose < 0) continue;
       const FeatureFrame& features = *map.FindKeyframe(observation.keyframe)->features;
       problem.observations.push_back({pose, point, SeenAt(features, observation.keypoint)});
+    }
+    if (problem.observations.size() - num_before < 2) {
+      problem.observations.resize(num_before);
+    } else {
+      problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
+    }
+  }
+}
+
+double MedianDepth(const Map& map, const Keyframe& keyframe) {
+  const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
+  std::vector<double> depths;
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (id.valid()) depths.push_back((camera_from_world * map.FindLandmark(id)->position_in_world).z());
+  }
+  const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return std::max(*middle, 1e-3);
+}
+
+// Ties of the double window. Two outer poses are tied once, by the older one's or the younger one's choice.
+void AddTies(const Map& map, size_t num_inner, BundleProblem& problem) {
+  const double rad_per_px = kKeypointSigmaPx / problem.calibration.fx_px;
+  const auto index_of = [&](KeyframeId id) {
+    const auto found = std::find_if(problem.poses.begin(), problem.poses.end(),
+                                    [&](const BundlePose& pose) { return pose.id == id; });
+    return static_cast<size_t>(found - problem.poses.begin());
+  };
+  std::set<std::pair<size_t, size_t>> ties;
+  for (size_t i = num_inner; i < problem.poses.size(); ++i) {
+    const Keyframe& keyframe = *map.FindKeyframe(problem.poses[i].id);
+    const double depth = MedianDepth(map, keyframe);
+    int num_ties = 0;
+    for (const KeyframeId id : map.Covisible(problem.poses[i].id, static_cast<int>(keyframe.covisible.size()))) {
+      const size_t other = index_of(id);
+      if (other == problem.poses.size()) continue;
+      if (num_ties++ == kMaxTies) break;
+      if (!ties.insert(std::minmax(i, other)).second) continue;
+      RelativePoseConstraint tie;
+      tie.from = static_cast<int>(i);
+      tie.to = static_cast<int>(other);
+      tie.to_from_from = problem.poses[other].camera_from_world * problem.poses[i].camera_from_world.Inverse();
+      const double num_shared = keyframe.covisible.at(id);
+      tie.information *= num_shared / (rad_per_px * rad_per_px);
+      tie.information.topLeftCorner<3, 3>() /= depth * depth;
+      problem.constraints.push_back(tie);
     }
   }
 }
@@ -77,13 +127,14 @@ void MoveOwnLandmarks(KeyframeId id, const Rigid3& world_from_camera, MapEditor&
 
 }  // namespace
 
-BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window) {
+BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const LocalWindowOptions& options) {
   BundleProblem problem;
   problem.calibration = map.FindKeyframe(window.inner.front())->features->calibration;
   problem.baseline_m = Baseline(problem.calibration);
-  AddPoses(map, window, problem);
-  AddLandmarks(map, window.landmarks, problem);
-  problem.scale_pose = ScalePose(problem);
+  AddPoses(map, window, options.is_double, problem);
+  AddLandmarks(map, window.landmarks, options.is_double ? window.inner.size() : problem.poses.size(), problem);
+  if (options.is_double) AddTies(map, window.inner.size(), problem);
+  problem.scale_pose = problem.constraints.empty() ? ScalePose(problem) : -1;
   return problem;
 }
 
@@ -118,7 +169,7 @@ void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, 
                    MapEditor& editor) {
   const LocalWindow window = SelectLocalWindow(editor.map(), center, window_options);
   if (window.landmarks.empty()) return;
-  const BundleProblem problem = BuildLocalProblem(editor.map(), window);
+  const BundleProblem problem = BuildLocalProblem(editor.map(), window, window_options);
   if (const std::optional<BundleResult> result = AdjustBundle(problem, bundle_options)) {
     WriteBack(problem, *result, editor);
   }

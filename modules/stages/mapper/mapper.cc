@@ -45,7 +45,8 @@ void RefreshDescriptions(MapEditor& editor) {
     if (!IsFixed(editor.map(), id)) {
       editor.RemoveLandmark(id);
     } else {
-      editor.ChangeLandmark(id, DescribeLandmark(editor.map(), id));
+      editor.ChangeLandmark(id, editor.IsReobserved(id) ? DescribeLandmark(editor.map(), id)
+                                                        : DescribeMovedLandmark(editor.map(), id));
     }
   }
 }
