@@ -18,7 +18,7 @@ struct KeyframeDecisionOptions {
   // third from frame to frame is nothing to act on, a greater one is motion.
   double min_first_share = 0.4;
   double min_parallax_rad = 0.035;  // mono: 2 degrees of median parallax to the reference: new points can be placed well
-  double min_still_share = 0.8;     // few points, parallax or age is no reason while more than this is still seen
+  double min_still_share = 0.9;     // few points, parallax or age is no reason while more than this is still seen
   int min_points = 150;             // a frame that sees fewer known points becomes a keyframe if anything moved
   int64_t max_interval_us = 2000000;  // not longer than this, if anything moved
   int min_new_points = 70;          // stereo, RGB-D: near keypoints that see no known point ...
