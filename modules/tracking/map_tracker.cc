@@ -31,6 +31,7 @@ std::string MapTrackerOptions::Check() const {
     if (!sentence.empty()) return sentence;
   }
   if (!(sigma_px > 0.0)) return "tracker.sigma_px must be positive";
+  if (max_unanswered_keyframes < 2) return "the tracker must send at least two keyframes without an answer";
   if (min_inliers < 6 || max_local_keyframes < 1) return "tracker.min_inliers must be at least 6";
   return "";
 }
@@ -270,7 +271,8 @@ bool MapTracker::IsKeyframeDue() {
   }
   const Rigid3 world_from_reference = frame.world_from_camera * last_->reference_from_camera.Inverse();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
-  return decision_.Decide(frame, interval_us, world_from_reference, near);
+  const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near);
+  return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;
 }
 
 // The frame becomes the reference of those to come.

@@ -34,6 +34,7 @@ struct MapTrackerOptions {
   int min_relocalised_inliers = 50;  // likewise after a loss, where chance has more room
   int max_local_keyframes = 30;      // whose landmarks are looked for
   int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
+  int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
   double max_depth_baselines = 40.0; // stereo, RGB-D: up to here a keypoint's depth makes a point at once
 
   // Empty if all is well, else one sentence.
