@@ -35,6 +35,7 @@ TEST(DefaultSettings, OfTheMapper) {
   EXPECT_EQ(settings.Get<int>("mapper.min_shared_landmarks"), options.window.min_shared_landmarks);
   EXPECT_EQ(settings.Get<int>("mapper.max_inner_keyframes"), options.window.max_inner_keyframes);
   EXPECT_EQ(settings.Get<int>("mapper.max_outer_keyframes"), options.window.max_outer_keyframes);
+  EXPECT_EQ(settings.Get<bool>("mapper.always_ceres"), options.bundle.is_always_ceres);
   EXPECT_EQ(settings.Get<int>("mapper.bundle_iterations"), options.bundle.max_num_iterations);
   EXPECT_EQ(settings.Get<double>("mapper.redundant_share"), options.culling.redundant_share);
 }

@@ -19,6 +19,7 @@ MapperOptions OptionsFrom(const Settings& settings) {
   options.window.max_inner_keyframes = settings.Get<int>("mapper.max_inner_keyframes");
   options.window.max_outer_keyframes = settings.Get<int>("mapper.max_outer_keyframes");
   options.window.is_double = settings.Get<bool>("mapper.double_window");
+  options.bundle.is_always_ceres = settings.Get<bool>("mapper.always_ceres");
   options.bundle.max_num_iterations = settings.Get<int>("mapper.bundle_iterations");
   options.culling.redundant_share = settings.Get<double>("mapper.redundant_share");
   if (const std::string problem = options.Check(); !problem.empty()) {
