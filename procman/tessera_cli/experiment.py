@@ -17,6 +17,7 @@ REFERENCE = "CvOrb"
 WHOLE = "Extraction/whole"
 # The median of so many interleaved repetitions: a short disturbance of the machine hits few of them.
 REPETITIONS = 5
+TABLE_WIDTH = 130
 # What the benchmarks count beside time, where they do.
 COUNTERS = ("keypoints", "candidates", "wire_kB", "repeatability")
 
@@ -65,22 +66,25 @@ def _to_rows(results: list[dict]) -> list[Row]:
     reference_ms, whole_ms = medians[REFERENCE]["cpu_time"], medians[WHOLE]["cpu_time"]
     return [Row(name, result["cpu_time"], result["cpu_time"] / reference_ms, result["cpu_time"] / whole_ms,
                 {counter: result[counter] for counter in COUNTERS if counter in result})
-            for name, result in medians.items()]
+            for name, result in sorted(medians.items())]  # they come in random order
 
 
 def _print_table(rows: list[Row]) -> None:
+    from rich import box
     from rich.console import Console
     from rich.table import Table
 
     counters = [counter for counter in COUNTERS if any(counter in row.counters for row in rows)]
-    table = Table(title="Time per KITTI image, 2000 keypoints, one thread")
+    table = Table(title="Time per KITTI image, 2000 keypoints, one thread", box=box.SIMPLE_HEAD, padding=(0, 1))
     table.add_column("what", no_wrap=True)
     for heading in ("CPU ms", "x cv::ORB", "x whole", *counters):
         table.add_column(heading, justify="right")
     for row in rows:
         figures = [f"{row.counters[counter]:.4g}" if counter in row.counters else "" for counter in counters]
         table.add_row(row.name, f"{row.cpu_ms:.2f}", f"{row.of_reference:.2f}", f"{row.of_whole:.2f}", *figures)
-    Console().print(table)
+    console = Console()
+    console.width = max(console.width, TABLE_WIDTH)  # figures must not be cut short where there is no wide terminal
+    console.print(table)
 
 
 def _write_csv(rows: list[Row], path: Path) -> None:
