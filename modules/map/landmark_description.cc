@@ -4,10 +4,10 @@
 #include <cmath>
 #include <vector>
 
+#include "features/pyramid.h"
+
 namespace tessera {
 namespace {
-
-constexpr double kLevelScale = 1.2;
 
 size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
 
@@ -50,8 +50,8 @@ Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   const Keypoint& keypoint = newest.features->keypoints[Index(observations.back().keypoint)];
   const double distance = (newest.world_from_camera.translation - landmark.position_in_world).norm();
   constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;
-  landmark.max_distance = distance * std::pow(kLevelScale, keypoint.level);
-  landmark.min_distance = landmark.max_distance / std::pow(kLevelScale, kTopLevel);
+  landmark.max_distance = distance * LevelScale(keypoint.level);
+  landmark.min_distance = landmark.max_distance / LevelScale(kTopLevel);
   return landmark;
 }
 

@@ -1,22 +1,10 @@
 #include "tracking/frame_view.h"
 
-#include <array>
+#include <algorithm>
 #include <utility>
 
 namespace tessera {
 namespace {
-
-constexpr int kMaxLevel = 31;
-
-std::array<double, kMaxLevel + 1> MakeLevelScales() {
-  std::array<double, kMaxLevel + 1> scales;
-  double scale = 1.0;
-  for (double& value : scales) {
-    value = scale;
-    scale *= kLevelScale;
-  }
-  return scales;
-}
 
 FeatureFrame WithPairsOnly(FeatureFrame features) {
   const size_t size = std::min(features.keypoints.size(), features.descriptors.size());
@@ -38,11 +26,6 @@ double BaselineOf(const CameraCalibration& calibration, double rgbd_baseline_m) 
 }
 
 }  // namespace
-
-double ScaleOfLevel(int level) {
-  static const std::array<double, kMaxLevel + 1> scales = MakeLevelScales();
-  return scales[static_cast<size_t>(std::clamp(level, 0, kMaxLevel))];
-}
 
 FrameView::FrameView(FeatureFrame features, double sigma_px, double rgbd_baseline_m)
     : features_(WithPairsOnly(std::move(features))),

@@ -5,15 +5,11 @@
 #include <cstdint>
 
 #include "features/feature_types.h"
+#include "features/pyramid.h"
 #include "geometry/reprojection.h"
 #include "tracking/feature_grid.h"
 
 namespace tessera {
-
-inline constexpr double kLevelScale = 1.2;  // one pixel of level l is kLevelScale^l pixels of level 0
-
-// kLevelScale^level
-double ScaleOfLevel(int level);
 
 // Never changes once made; keyframes share it with the frame that they came from.
 class FrameView {
@@ -35,7 +31,7 @@ class FrameView {
   // Column in the right image, measured or from the depth; kNoColumn: none.
   double right_x_px(int i) const;
   PixelObservation observation(int i) const;
-  double sigma_px(int level) const { return sigma_px_ * ScaleOfLevel(level); }
+  double sigma_px(int level) const { return sigma_px_ * LevelScale(level); }
   Eigen::Vector3d ray(int i) const { return calibration().Ray(pixel(i)); }
 
  private:

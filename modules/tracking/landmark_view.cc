@@ -25,7 +25,7 @@ FeatureGrid MakeGrid(const FeatureFrame& features) {
 
 PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint) {
   const Keypoint& k = features.keypoints[static_cast<size_t>(keypoint)];
-  PixelObservation seen{{k.x_px, k.y_px}, kNoColumn, kKeypointSigmaPx * ScaleOfLevel(k.level)};
+  PixelObservation seen{{k.x_px, k.y_px}, kNoColumn, kKeypointSigmaPx * LevelScale(k.level)};
   if (features.calibration.sensor == SensorType::kStereo) {
     seen.right_x_px = k.right_x_px >= 0.0F && k.right_x_px < k.x_px ? k.right_x_px : kNoColumn;
   } else if (features.calibration.sensor == SensorType::kRgbd && k.depth_m > 0.0F) {
@@ -64,7 +64,7 @@ std::optional<ExpectedView> Expect(const View& view, const Landmark& landmark) {
   if (expected.cos_angle < 0.5) return std::nullopt;
   // The lowest level at which the patch is no finer than it was: 1.2^level >= max_distance / distance.
   while (expected.level < kTopLevel &&
-         ScaleOfLevel(expected.level) * expected.distance < landmark.max_distance) {
+         LevelScale(expected.level) * expected.distance < landmark.max_distance) {
     ++expected.level;
   }
   return expected;

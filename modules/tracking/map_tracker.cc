@@ -18,8 +18,8 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
   const double distance = point_in_camera.norm();
   point.position_in_world = point_in_camera;
   point.normal = -point_in_camera / distance;
-  point.max_distance = distance * ScaleOfLevel(view.keypoint(keypoint).level);
-  point.min_distance = point.max_distance / ScaleOfLevel(kTopLevel);
+  point.max_distance = distance * LevelScale(view.keypoint(keypoint).level);
+  point.min_distance = point.max_distance / LevelScale(kTopLevel);
   point.descriptor = view.descriptor(keypoint);
   return point;
 }

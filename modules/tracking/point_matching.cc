@@ -58,7 +58,7 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
     const Keypoint& from = last.view->keypoint(static_cast<int>(i));
     int best_distance = options.max_hamming + 1;
     int32_t best = -1;
-    frame.view->grid().VisitWindow(pixel, radius_px * ScaleOfLevel(from.level), [&](int32_t candidate) {
+    frame.view->grid().VisitWindow(pixel, radius_px * LevelScale(from.level), [&](int32_t candidate) {
       const Keypoint& to = frame.view->keypoint(candidate);
       if (std::abs(int{to.level} - int{from.level}) > 1 || !AreAnglesNear(from.angle, to.angle, roll)) return;
       const int distance = HammingDistance(last.view->descriptor(static_cast<int>(i)), frame.view->descriptor(candidate));
@@ -82,7 +82,7 @@ int MatchLocal(const PlacedPoints& points, double radius_px,
     if (!expected) continue;
     // Seen as before, a point is found close to where it should be (ORB-SLAM: Mur-Artal et al. 2015).
     const double radius = radius_px * (expected->cos_angle > 0.998 ? 0.625 : 1.0) *
-                          ScaleOfLevel(expected->level);
+                          LevelScale(expected->level);
     int best_distance = options.max_hamming + 1, second_distance = 257, best_level = -1, second_level = -1;
     int32_t best = -1;
     frame.view->grid().VisitWindow(expected->pixel_px, radius, [&](int32_t candidate) {

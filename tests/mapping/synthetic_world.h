@@ -57,7 +57,7 @@ class SyntheticWorld {
       const double size = std::log(25.0 / point.norm()) / std::log(1.2);
       Keypoint keypoint;
       keypoint.level = static_cast<uint8_t>(std::clamp(std::lround(size), 0L, 7L));
-      const double sigma = noise_px_ > 0.0 ? ScaleOfLevel(keypoint.level) : 0.0;
+      const double sigma = noise_px_ > 0.0 ? LevelScale(keypoint.level) : 0.0;
       Eigen::Vector2d pixel = calibration_.Project(point);
       pixel += sigma * Eigen::Vector2d(noise(generator_), noise(generator_));
       if (pixel.x() < 0.0 || pixel.x() >= 960.0 || pixel.y() < 0.0 || pixel.y() >= 480.0) continue;

@@ -50,7 +50,7 @@ class PairSearch {
         rotation_(second_from_first_.rotation.toRotationMatrix()), roll_(RollBetween(second_from_first_)),
         max_inverse_depth_(1.0 / min_depth) {
     for (int level = 0; level < kMaxLevels; ++level) {
-      limits_px_[static_cast<size_t>(level)] = std::sqrt(kLineChi2) * ScaleOfLevel(level);
+      limits_px_[static_cast<size_t>(level)] = std::sqrt(kLineChi2) * LevelScale(level);
     }
     // Only what sees no landmark yet is looked for.
     std::vector<Keypoint> keypoints;
@@ -146,7 +146,7 @@ std::optional<int32_t> PairSearch::BestOnLine(int32_t keypoint, const PixelObser
     const int distance = HammingDistance(descriptor, second_.features->descriptors[Index(candidate)]);
     const Eigen::Vector2d to_px(to.x_px, to.y_px);
     // The same corner found on another level is no rival.
-    const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * ScaleOfLevel(to.level);
+    const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
     if (distance < best_distance) {
       if (is_elsewhere && best >= 0) second_distance = best_distance;
       best_distance = distance;
@@ -190,8 +190,8 @@ bool PairSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const Pixel
   }
   // A patch twice as far away looks half as large: distance / sigma must be alike, up to one and a half levels' ratio.
   const double ratio = point_in_second.norm() / in_second.sigma_px / (point_in_first.norm() / in_first.sigma_px);
-  constexpr double kMaxRatio = 1.5 * kLevelScale;
-  return ratio < kMaxRatio && ratio * kMaxRatio > 1.0;
+  const double max_ratio = 1.5 * LevelScale(1);
+  return ratio < max_ratio && ratio * max_ratio > 1.0;
 }
 
 }  // namespace

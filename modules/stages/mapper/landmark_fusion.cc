@@ -31,7 +31,7 @@ int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const Vi
   if (!expected) return -1;
   const double baseline_m = Baseline(view.calibration);
   const Eigen::Vector3d point_in_camera = view.rotation * landmark.position_in_world + view.translation;
-  const double radius_px = options.radius_px * ScaleOfLevel(expected->level);
+  const double radius_px = options.radius_px * LevelScale(expected->level);
   int32_t best = -1;
   int best_distance = options.max_hamming + 1;
   grid.VisitWindow(expected->pixel_px, radius_px, [&](int32_t i) {
