@@ -8,6 +8,11 @@
 #include "datasets/stream_source.h"
 
 namespace tessera {
+namespace {
+
+constexpr const char* kKinds = "kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME or log:FILE";
+
+}  // namespace
 
 SensorType ParseSensor(const std::string& text) {
   for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo, SensorType::kRgbd}) {
@@ -24,8 +29,7 @@ std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   const std::string kind = source.substr(0, source.find(':'));
   const std::string rest = source.size() > kind.size() ? source.substr(kind.size() + 1) : "";
   if (rest.empty()) {
-    throw InputError("source `" + source +
-                     "` must be kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME or log:FILE");
+    throw InputError("source `" + source + "` must be " + kKinds);
   }
   if (kind == "kitti") return PlayRecording(LoadKitti(rest, options), options);
   if (kind == "euroc") return PlayRecording(LoadEuroc(rest, options), options);
@@ -34,9 +38,7 @@ std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   if (kind == "video") return OpenVideoFile(rest, options);
   if (kind == "camera") return OpenDevice(rest, options);
   if (kind == "rtsp" || kind == "rtsps") return OpenNetworkStream(source, options);
-  throw InputError("source `" + source +
-                   "` is of an unknown kind: give kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, "
-                   "rtsp://..., sim:NAME or log:FILE");
+  throw InputError("source `" + source + "` is of an unknown kind: give " + kKinds);
 }
 
 }  // namespace tessera

@@ -196,7 +196,9 @@ class StreetBuilder {
       const Eigen::Vector2d middle = spot.on_middle + random_.Uniform(4.6, 4.75) * spot.out;
       // Not across the mouth of another street.
       if (world_.streets->DistanceToStreet(middle) < 4.5 || drive_.DistanceToStreet(middle) < 2.7) continue;
-      builder_.Add(BuildCar(middle, random_.Chance(0.9) ? spot.along : Eigen::Vector2d(-spot.along), random_.Next(), builder_));
+      const uint32_t seed = random_.Next();
+      const Eigen::Vector2d ahead = random_.Chance(0.9) ? spot.along : Eigen::Vector2d(-spot.along);
+      builder_.Add(BuildCar(middle, ahead, seed, builder_));
     }
   }
 
@@ -218,7 +220,8 @@ class StreetBuilder {
         const Eigen::Vector2d corner(column * kTileM, row * kTileM);
         const Eigen::Vector2d middle = corner + Eigen::Vector2d::Constant(0.5 * kTileM);
         if (world_.streets->DistanceToStreet(middle) > 18.0) continue;
-        AddGround(corner, kTileM, 0.025, 0.0);
+        const PaintSpec spec{Material::kGround, HashOf(seed_, 5), kTileM, kTileM, 0.025, corner};
+        builder_.Add({{corner.x(), 0.0, corner.y()}, {kTileM, 0.0, 0.0}, {0.0, 0.0, kTileM}, builder_.AddPaint(spec), 0.95F});
       }
     }
     const Eigen::Vector2d corner = low - Eigen::Vector2d::Constant(200.0);
@@ -226,11 +229,6 @@ class StreetBuilder {
     const int32_t grass = builder_.AddPaint({Material::kHedge, HashOf(seed_, 4), extent.x(), extent.y(), 0.5});
     // A little deeper, so that the tiles hide it.
     world_.far.push_back({{corner.x(), 0.05, corner.y()}, {extent.x(), 0.0, 0.0}, {0.0, 0.0, extent.y()}, grass, 0.95F});
-  }
-
-  void AddGround(const Eigen::Vector2d& corner, double size_m, double texel_m, double depth_m) {
-    PaintSpec spec{Material::kGround, HashOf(seed_, 5), size_m, size_m, texel_m, corner};
-    builder_.Add({{corner.x(), depth_m, corner.y()}, {size_m, 0.0, 0.0}, {0.0, 0.0, size_m}, builder_.AddPaint(spec), 0.95F});
   }
 
   void BuildSkyline() {

@@ -143,14 +143,4 @@ void Canvas::Scribble(const Area& area, double cell_m, double tone) {
   }
 }
 
-void Canvas::Shade(const Area& area, double change) {
-  const Rect rect = ToTexels(area);
-  for (int y = rect.y; y < rect.bottom(); ++y) {
-    const auto add = static_cast<float>(change * static_cast<double>(rect.bottom() - 1 - y) / std::max(1, rect.height));
-    for (int x = rect.x; x < rect.right(); ++x) {
-      image_.row(y)[x] = ToGrey(static_cast<float>(image_.row(y)[x]) + add);
-    }
-  }
-}
-
 }  // namespace tessera

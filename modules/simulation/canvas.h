@@ -34,8 +34,6 @@ class Canvas {
   void Bricks(const Area& area, double brick_m, double course_m, double tone);
   // Letters or spray of no meaning: strokes in a grid of cells.
   void Scribble(const Area& area, double cell_m, double tone);
-  // Makes texels brighter (or darker) by `change` times the height in the area, 0 at its bottom.
-  void Shade(const Area& area, double change);
 
   double width_m() const { return width_m_; }
   double height_m() const { return height_m_; }

@@ -56,7 +56,8 @@ void PaintFloor(double bottom_m, const FacadeStyle& style, Canvas& canvas) {
 void PaintStreetLevel(const FacadeStyle& style, Canvas& canvas) {
   Random& random = canvas.random();
   const double width = canvas.width_m();
-  canvas.Fill({0.0, 0.0, width, random.Uniform(0.4, 1.0)}, style.wall_tone - random.Uniform(20.0, 50.0), {8.0, 10.0});
+  const double plinth_tone = style.wall_tone - random.Uniform(20.0, 50.0);
+  canvas.Fill({0.0, 0.0, width, random.Uniform(0.4, 1.0)}, plinth_tone, {8.0, 10.0});
   for (double x = random.Uniform(0.3, 1.5); x + 1.2 < width;) {
     if (style.has_shops && random.Chance(0.6)) {
       const double span = std::min(random.Uniform(2.5, 5.0), width - x - 0.2);
@@ -84,11 +85,16 @@ void PaintTraces(const FacadeStyle& style, Canvas& canvas) {
     const double y = random.Uniform(0.2, 2.6);
     switch (random.Index(4)) {
       case 0: canvas.Fill({x, 0.0, 0.12, canvas.height_m()}, style.wall_tone - 45.0); break;
-      case 1: canvas.Fill({x, y, random.Uniform(0.3, 0.8), random.Uniform(0.3, 0.9)}, random.Uniform(40.0, 230.0)); break;
-      case 2:
-        canvas.Fill({x, y, random.Uniform(0.6, 2.0), random.Uniform(0.4, 1.5)},
-                    style.wall_tone + random.Uniform(-35.0, 35.0), {5.0, 6.0});
+      case 1: {
+        const double tone = random.Uniform(40.0, 230.0);
+        canvas.Fill({x, y, random.Uniform(0.3, 0.8), random.Uniform(0.3, 0.9)}, tone);
         break;
+      }
+      case 2: {
+        const double tone = style.wall_tone + random.Uniform(-35.0, 35.0);
+        canvas.Fill({x, y, random.Uniform(0.6, 2.0), random.Uniform(0.4, 1.5)}, tone, {5.0, 6.0});
+        break;
+      }
       default: canvas.Scribble({x, y, 1.6, 0.5}, 0.42, random.Uniform(20.0, 240.0)); break;
     }
   }

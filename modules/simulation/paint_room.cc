@@ -13,9 +13,10 @@ Texture PaintWallpaper(const PaintSpec& spec) {
   canvas.Fill({0.0, 0.0, spec.width_m, 0.1}, tone - 70.0);  // skirting board
   for (int i = 0; i < static_cast<int>(2.0 * spec.width_m); ++i) {  // switches, sockets, hooks, notes
     const double size = random.Uniform(0.05, 0.2);
+    const double thing_tone = random.Uniform(30.0, 240.0);
     canvas.Fill({random.Uniform(0.0, spec.width_m - size), random.Uniform(0.2, spec.height_m - 0.3), size,
                  random.Uniform(0.05, 0.25)},
-                random.Uniform(30.0, 240.0), {4.0, 4.0});
+                thing_tone, {4.0, 4.0});
   }
   return MakeTexture(std::move(canvas.image()), {});
 }
@@ -26,8 +27,9 @@ Texture PaintPoster(const PaintSpec& spec) {
   for (int i = 0; i < 14; ++i) {
     const double width = random.Uniform(0.1, 0.5) * spec.width_m;
     const double height = random.Uniform(0.05, 0.4) * spec.height_m;
-    canvas.Fill({random.Uniform(0.0, spec.width_m - width), random.Uniform(0.0, spec.height_m - height), width, height},
-                random.Uniform(20.0, 240.0), {8.0, 20.0});
+    const double tone = random.Uniform(20.0, 240.0);
+    canvas.Fill({random.Uniform(0.0, spec.width_m - width), random.Uniform(0.0, spec.height_m - height), width, height}, tone,
+                {8.0, 20.0});
   }
   canvas.Scribble({0.1 * spec.width_m, 0.08 * spec.height_m, 0.8 * spec.width_m, 0.2 * spec.height_m},
                   0.06 * spec.width_m, 20.0);

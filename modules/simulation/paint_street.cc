@@ -44,6 +44,12 @@ double GrassTone(uint32_t seed, int x, int y) {
          22.0 * static_cast<double>(StainAt(HashOf(seed, 2), x / 2, y / 2));
 }
 
+// Sides and ends of a car have one colour.
+double CarTone(uint32_t seed) {
+  Random random(HashOf(seed, 13));
+  return random.Chance(0.5) ? random.Uniform(25.0, 90.0) : random.Uniform(130.0, 225.0);
+}
+
 double GroundTone(const StreetPlace& place, uint32_t seed, int x, int y) {
   const double side = std::abs(place.lateral_m);
   if (side > kLotLineM) return GrassTone(seed, x, y);
@@ -109,14 +115,14 @@ Texture PaintFence(const PaintSpec& spec) {
   const double tone = random.Uniform(90.0, 200.0);
   const double plank_m = random.Uniform(0.1, 0.25);
   for (double x = 0.0; x < spec.width_m; x += plank_m + 0.02) {
-    canvas.Fill({x, 0.0, plank_m, spec.height_m * random.Uniform(0.93, 1.0)}, tone + random.Uniform(-18.0, 18.0), {6.0, 9.0});
+    const double plank_tone = tone + random.Uniform(-18.0, 18.0);
+    canvas.Fill({x, 0.0, plank_m, spec.height_m * random.Uniform(0.93, 1.0)}, plank_tone, {6.0, 9.0});
   }
   return MakeTexture(std::move(canvas.image()), {});
 }
 
 Texture PaintCarSide(const PaintSpec& spec) {
-  Random random(HashOf(spec.seed, 13));
-  const double tone = random.Chance(0.5) ? random.Uniform(25.0, 90.0) : random.Uniform(130.0, 225.0);
+  const double tone = CarTone(spec.seed);
   Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, tone, {2.0, 5.0});
   const double w = spec.width_m;
   const double h = spec.height_m;
@@ -134,8 +140,7 @@ Texture PaintCarSide(const PaintSpec& spec) {
 }
 
 Texture PaintCarEnd(const PaintSpec& spec) {
-  Random random(HashOf(spec.seed, 13));
-  const double tone = random.Chance(0.5) ? random.Uniform(25.0, 90.0) : random.Uniform(130.0, 225.0);
+  const double tone = CarTone(spec.seed);
   Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, tone, {2.0, 5.0});
   const double w = spec.width_m;
   const double h = spec.height_m;

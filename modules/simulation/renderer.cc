@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 namespace tessera {
@@ -35,7 +36,8 @@ class Drawer {
  public:
   Drawer(const CameraCalibration& camera, Rendering& out) : camera_(camera), out_(out) {}
 
-  void Draw(const Surface& surface, const Rigid3& camera_from_world, const Texture& texture);
+  // The surface is in the camera's frame.
+  void Draw(const Surface& surface, const Texture& texture);
 
  private:
   struct Span {
@@ -43,9 +45,8 @@ class Drawer {
   };
 
   // The parallelogram cut at z = kNearM, in pixels; fewer than three points: nothing to see.
-  std::vector<Eigen::Vector2d> Outline(const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up) const;
-  static Plane MakePlane(const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up,
-                         const GrayImage& finest);
+  std::vector<Eigen::Vector2d> Outline(const Surface& surface) const;
+  static Plane MakePlane(const Surface& surface, const GrayImage& finest);
   // Pixels of row y whose middle lies inside the convex outline.
   Span SpanOf(const std::vector<Eigen::Vector2d>& outline, int y) const;
   AffineRow RowOf(const Eigen::Vector3d& coefficients, int y) const;
@@ -55,9 +56,8 @@ class Drawer {
   Rendering& out_;
 };
 
-std::vector<Eigen::Vector2d> Drawer::Outline(const Eigen::Vector3d& corner, const Eigen::Vector3d& across,
-                                             const Eigen::Vector3d& up) const {
-  const std::array<Eigen::Vector3d, 4> points{corner, corner + across, corner + across + up, corner + up};
+std::vector<Eigen::Vector2d> Drawer::Outline(const Surface& surface) const {
+  const std::array<Eigen::Vector3d, 4> points = surface.Corners();
   std::vector<Eigen::Vector2d> outline;
   for (size_t i = 0; i < 4; ++i) {
     const Eigen::Vector3d& from = points[i];
@@ -73,8 +73,8 @@ std::vector<Eigen::Vector2d> Drawer::Outline(const Eigen::Vector3d& corner, cons
   return outline;
 }
 
-Plane Drawer::MakePlane(const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up,
-                        const GrayImage& finest) {
+Plane Drawer::MakePlane(const Surface& surface, const GrayImage& finest) {
+  const auto& [corner, across, up] = std::tie(surface.corner, surface.across, surface.up);
   const Eigen::Vector3d n = across.cross(up);
   const double squared = n.squaredNorm();
   // Rows of the paint run from top to bottom.
@@ -164,11 +164,8 @@ void Drawer::DrawRow(const Plane& plane, const Surface& surface, const Texture& 
   }
 }
 
-void Drawer::Draw(const Surface& surface, const Rigid3& camera_from_world, const Texture& texture) {
-  const Eigen::Vector3d corner = camera_from_world * surface.corner;
-  const Eigen::Vector3d across = camera_from_world.rotation * surface.across;
-  const Eigen::Vector3d up = camera_from_world.rotation * surface.up;
-  const std::vector<Eigen::Vector2d> outline = Outline(corner, across, up);
+void Drawer::Draw(const Surface& surface, const Texture& texture) {
+  const std::vector<Eigen::Vector2d> outline = Outline(surface);
   if (outline.size() < 3) return;
   double top = 1e9;
   double bottom = -1e9;
@@ -178,24 +175,28 @@ void Drawer::Draw(const Surface& surface, const Rigid3& camera_from_world, const
   }
   const int first = static_cast<int>(std::clamp(std::ceil(top), 0.0, static_cast<double>(camera_.height_px)));
   const int last = static_cast<int>(std::clamp(std::ceil(bottom), 0.0, static_cast<double>(camera_.height_px)));
-  const Plane plane = MakePlane(corner, across, up, texture.levels[0]);
+  const Plane plane = MakePlane(surface, texture.levels[0]);
   for (int y = first; y < last; ++y) {
     const Span span = SpanOf(outline, y);
     if (span.first < span.last) DrawRow(plane, surface, texture, y, span);
   }
 }
 
-// Whether part of the surface can lie inside the picture.
-bool IsInSight(const Surface& surface, const CameraCalibration& camera, const Rigid3& camera_from_world) {
-  const Eigen::Vector3d corner = camera_from_world * surface.corner;
-  const Eigen::Vector3d across = camera_from_world.rotation * surface.across;
-  const Eigen::Vector3d up = camera_from_world.rotation * surface.up;
-  if (!surface.two_sided && across.cross(up).dot(corner) >= 0.0) return false;  // seen from behind
+Surface InCamera(const Rigid3& camera_from_world, Surface surface) {
+  surface.corner = camera_from_world * surface.corner;
+  surface.across = camera_from_world.rotation * surface.across;
+  surface.up = camera_from_world.rotation * surface.up;
+  return surface;
+}
+
+// Whether part of the surface, in the camera's frame, can lie inside the picture.
+bool IsInSight(const Surface& surface, const CameraCalibration& camera) {
+  if (!surface.two_sided && surface.across.cross(surface.up).dot(surface.corner) >= 0.0) return false;  // seen from behind
   // Planes through the eye and the picture's borders: all four corners beyond one of them can't be seen.
   const double left = -camera.cx_px / camera.fx_px, right = (camera.width_px - camera.cx_px) / camera.fx_px;
   const double top = -camera.cy_px / camera.fy_px, bottom = (camera.height_px - camera.cy_px) / camera.fy_px;
   int beyond[5] = {};
-  for (const Eigen::Vector3d& p : {corner, Eigen::Vector3d(corner + across), Eigen::Vector3d(corner + up), Eigen::Vector3d(corner + across + up)}) {
+  for (const Eigen::Vector3d& p : surface.Corners()) {
     beyond[0] += p.z() < kNearM ? 1 : 0;
     beyond[1] += p.x() < left * p.z() ? 1 : 0;
     beyond[2] += p.x() > right * p.z() ? 1 : 0;
@@ -273,9 +274,9 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& camera_fro
   const Eigen::Vector3d eye = camera_from_world.Inverse().translation;
   const auto add = [&](const Surface& surface, double sight_m) {
     const double distance = (surface.Centre() - eye).norm() - 0.5 * (surface.across + surface.up).norm();
-    if (distance < sight_m && IsInSight(surface, camera, camera_from_world)) {
-      visible_.push_back({distance, visible_.size(), surface});
-    }
+    if (distance >= sight_m) return;
+    const Surface in_camera = InCamera(camera_from_world, surface);
+    if (IsInSight(in_camera, camera)) visible_.push_back({distance, visible_.size(), in_camera});
   };
   for (const Surface& surface : world_->surfaces) add(surface, world_->sight_m);
   for (const Surface& surface : world_->far) add(surface, 1e9);
@@ -299,7 +300,7 @@ void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_
   Collect(camera, camera_from_world, time_s);
   Drawer drawer(camera, out);
   for (const Visible& visible : visible_) {
-    drawer.Draw(visible.surface, camera_from_world, paints_.Get(visible.surface.paint));
+    drawer.Draw(visible.surface, paints_.Get(visible.surface.paint));
   }
 }
 

@@ -53,7 +53,7 @@ class Renderer {
   struct Visible {
     double distance_m;
     size_t order;  // ties
-    Surface surface;
+    Surface surface;    // in the camera's frame
   };
   void Collect(const CameraCalibration& camera, const Rigid3& camera_from_world, double time_s);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -23,6 +24,8 @@ struct Surface {
   bool two_sided = false;
 
   Eigen::Vector3d Centre() const { return corner + 0.5 * (across + up); }
+  // In the order of its outline.
+  std::array<Eigen::Vector3d, 4> Corners() const { return {corner, corner + across, corner + across + up, corner + up}; }
 };
 
 // A car that drives along a line, against the camera's direction.

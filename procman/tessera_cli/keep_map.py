@@ -11,7 +11,7 @@ from tessera_cli.bus import BusListener
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BIN
 from tessera_cli.interrupt import Interrupt
-from tessera_cli.processes import StageProcess, describe_exit
+from tessera_cli.processes import StageProcess
 from tessera_cli.progress import FINISHED
 
 # A living stage tells its status twice a second.
@@ -45,10 +45,7 @@ def _write_map(values: dict, folder: Path) -> None:
         status = _wait(writer, bus, interrupt)
     finally:
         writer.kill()
-    if status == 2:
-        raise UserError(f"map_writer: {writer.last_words()}")
-    if status != 0:
-        raise RunFailed(f"map_writer {describe_exit(status)}: {writer.last_words()}")
+    writer.require_success(status)
     print(f"tessera: {writer.last_words()}", flush=True)
 
 

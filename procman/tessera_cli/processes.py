@@ -8,6 +8,8 @@ import subprocess
 import time
 from pathlib import Path
 
+from tessera_cli.errors import RunFailed, UserError
+
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -87,6 +89,13 @@ class StageProcess:
             lines = []
         # A stage names itself first; who quotes its words has named it already.
         return re.sub(r"^tessera-[a-z-]+: ", "", lines[-1].strip()) if lines else "(it said nothing)"
+
+    def require_success(self, status: int) -> None:
+        """Raises what its exit status and last words say if it did not end well."""
+        if status == 2:
+            raise UserError(f"{self.name}: {self.last_words()}")
+        if status != 0:
+            raise RunFailed(f"{self.name} {describe_exit(status)}: {self.last_words()}")
 
 
 def describe_exit(status: int) -> str:

@@ -17,7 +17,7 @@ from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BIN, unfinished
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.panel import LINE_PERIOD_S
-from tessera_cli.processes import StageProcess, describe_exit
+from tessera_cli.processes import StageProcess
 from tessera_cli.sources import Source, parse_source
 from tessera_cli.types import end_of_stream_t
 
@@ -62,10 +62,7 @@ def _write_log(arguments: Namespace, source: Source, log: Path, folder: Path) ->
         status = _wait(camera, interrupt, log)
     finally:
         camera.kill()
-    if status == 2:
-        raise UserError(f"camera: {camera.last_words()}")
-    if status != 0:
-        raise RunFailed(f"camera {describe_exit(status)}: {camera.last_words()}")
+    camera.require_success(status)
 
 
 def _wait(camera: StageProcess, interrupt: Interrupt, log: Path) -> int:
