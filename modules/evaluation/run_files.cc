@@ -113,15 +113,32 @@ std::string FramesCsv(const RunRecord& record) {
   return text;
 }
 
+std::string LoopsCsv(const RunRecord& record) {
+  std::string text = "keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n";
+  const Map& map = record.map();
+  for (const ClosedLoop& loop : map.closed_loops()) {
+    const auto seconds = [&](KeyframeId id) {
+      const Keyframe* keyframe = map.FindKeyframe(id);
+      return keyframe == nullptr ? 0.0 : 1e-6 * static_cast<double>(keyframe->features->utime_us);
+    };
+    char row[128];
+    std::snprintf(row, sizeof row, "%.6f,%.6f,%d,%.6f\n", seconds(loop.current), seconds(loop.matched), loop.num_points,
+                  loop.scale);
+    text += row;
+  }
+  return text;
+}
+
 std::string RunJson(const RunRecord& record) {
   const FrameCounts counts = record.Counts();
   const std::vector<FrameRecord> frames = record.Frames();
-  Json stage_ms = Json::object();
+  Json stage_ms = Json::object(), stage_values = Json::object();
   int64_t num_repaired = 0, num_lost = 0;
   for (const auto& [name, figures] : record.stages()) {
     if (figures.step_ms.count > 0) {
       stage_ms[name] = ToJson(figures.step_ms);
     }
+    if (!figures.values.empty()) stage_values[name] = figures.values;
     num_repaired += figures.num_repaired;
     num_lost += figures.num_lost;
   }
@@ -131,12 +148,15 @@ std::string RunJson(const RunRecord& record) {
                      {"frames_initializing", counts.initializing},
                      {"frames_dropped", counts.dropped},
                      {"tracking_failures", counts.tracking_failures},
+                     {"relocalizations", counts.relocalizations},
+                     {"loops_closed", record.map().closed_loops().size()},
                      {"keyframes", record.map().keyframes().size()},
                      {"landmarks", record.map().landmarks().size()},
                      {"pose_time_ms", ToJson(SummarizeFrames(frames, &FrameRecord::pose_time_ms))},
                      {"latency_ms", ToJson(SummarizeFrames(frames, &FrameRecord::latency_ms))},
                      {"map_wait_ms", ToJson(SummarizeFrames(frames, &FrameRecord::map_wait_ms))},
                      {"stage_ms", stage_ms},
+                     {"stage_values", stage_values},
                      {"messages_repaired", num_repaired},
                      {"messages_lost", num_lost},
                      {"trajectory_sha256", record.TrajectorySha256()},
@@ -157,6 +177,7 @@ void WriteRun(const RunRecord& record, const std::string& folder) {
   WriteFile(folder + "/map.ply", PlyText(record.map()));
   WriteFile(folder + "/ground_truth.txt", TumText(record.GroundTruth()));
   WriteFile(folder + "/frames.csv", FramesCsv(record));
+  WriteFile(folder + "/loops.csv", LoopsCsv(record));
   WriteFile(folder + "/run.json", RunJson(record));  // last: whoever sees it finds all the others
 }
 

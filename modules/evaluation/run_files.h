@@ -15,11 +15,15 @@ void WriteFile(const std::string& path, const std::string& text);
 // is_keyframe, num_deltas. What is unknown is empty.
 std::string FramesCsv(const RunRecord& record);
 
+// One row a closed loop: when its two keyframes were taken, landmarks that both see, by how much the later one's
+// surroundings were enlarged (mono).
+std::string LoopsCsv(const RunRecord& record);
+
 // The figures of the run (INTERFACE: `summary.json` is made of them), as JSON.
 std::string RunJson(const RunRecord& record);
 
 // Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, map.ply, ground_truth.txt,
-// frames.csv and, at the very end, run.json into the folder, which is made if need be. Throws InputError if
+// frames.csv, loops.csv and, at the very end, run.json into the folder, which is made if need be. Throws InputError if
 // one can't be written.
 void WriteRun(const RunRecord& record, const std::string& folder);
 

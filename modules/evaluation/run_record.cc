@@ -59,6 +59,7 @@ FrameCounts RunRecord::Counts() const {
     const TrackingState state = pose.estimate.state;
     if (state == TrackingState::kTracked) {
       ++counts.tracked;
+      counts.relocalizations += pose.estimate.is_relocalized ? 1 : 0;
     } else if (counts.tracked == 0) {
       ++counts.initializing;
     } else {
@@ -81,9 +82,9 @@ FrameCounts RunRecord::Counts() const {
 }
 
 StampedPose RunRecord::FinalPose(const PoseEstimate& estimate) const {
-  const std::optional<Rigid3> world_from_reference = removed_.Find(map_, estimate.reference_keyframe);
+  const std::optional<Sim3> world_from_reference = removed_.Find(map_, estimate.reference_keyframe);
   return {estimate.frame, estimate.utime_us,
-          world_from_reference ? *world_from_reference * estimate.reference_from_camera : estimate.world_from_camera};
+          world_from_reference ? (*world_from_reference * estimate.reference_from_camera).Pose() : estimate.world_from_camera};
 }
 
 std::vector<StampedPose> RunRecord::Trajectory() const {

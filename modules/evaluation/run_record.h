@@ -40,6 +40,7 @@ struct FrameCounts {
   int64_t lost = 0;               // without a pose, after it
   int64_t dropped = 0;            // never reached the tracker
   int64_t tracking_failures = 0;  // changes from tracked to lost
+  int64_t relocalizations = 0;    // changes back, into a part of the map that was there before
 };
 
 // What a stage said last of its own work.
@@ -48,6 +49,7 @@ struct StageFigures {
   int64_t num_repaired = 0;  // messages
   int64_t num_lost = 0;      // messages
   int64_t num_dropped = 0;   // frames
+  std::map<std::string, double> values;  // what else it counts, by name
 };
 
 class RunRecord {

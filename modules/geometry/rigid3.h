@@ -46,6 +46,9 @@ struct Sim3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
+  static Sim3 From(const Rigid3& a_from_b, double scale = 1.0) { return {scale, a_from_b.rotation, a_from_b.translation}; }
+  // Where frame b stands and how it is turned, without its scale.
+  Rigid3 Pose() const { return {rotation, translation}; }
   Sim3 Inverse() const {
     const Eigen::Quaterniond inverse = rotation.conjugate();
     return {1.0 / scale, inverse, -(inverse * translation) / scale};
@@ -56,6 +59,7 @@ inline Sim3 operator*(const Sim3& a_from_b, const Sim3& b_from_c) {
   return {a_from_b.scale * b_from_c.scale, (a_from_b.rotation * b_from_c.rotation).normalized(),
           a_from_b.scale * (a_from_b.rotation * b_from_c.translation) + a_from_b.translation};
 }
+inline Sim3 operator*(const Sim3& a_from_b, const Rigid3& b_from_c) { return a_from_b * Sim3::From(b_from_c); }
 inline Eigen::Vector3d operator*(const Sim3& a_from_b, const Eigen::Vector3d& point_in_b) {
   return a_from_b.scale * (a_from_b.rotation * point_in_b) + a_from_b.translation;
 }

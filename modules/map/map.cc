@@ -54,6 +54,7 @@ uint64_t HashOf(KeyframeId id, const Keyframe& keyframe) {
       .Add(q.y())
       .Add(q.z())
       .Add(keyframe.world_from_camera.translation)
+      .Add(keyframe.scale)
       .value();
 }
 
@@ -70,6 +71,16 @@ uint64_t HashOf(const MapDelta::ChangedObservation& fact) {
       .Add(fact.landmark.value)
       .Add(fact.observation.keyframe.value)
       .Add(int64_t{fact.observation.keypoint})
+      .value();
+}
+
+uint64_t HashOf(size_t index, const ClosedLoop& loop) {
+  return FactHash(5)
+      .Add(static_cast<int64_t>(index))
+      .Add(loop.current.value)
+      .Add(loop.matched.value)
+      .Add(loop.scale)
+      .Add(int64_t{loop.num_points})
       .value();
 }
 
@@ -108,7 +119,7 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     }
     const size_t num_keypoints = added.features->keypoints.size();
     const Keyframe& keyframe =
-        keyframes_.Put(added.id, {added.features, HashOf(*added.features), added.world_from_camera, added.parent,
+        keyframes_.Put(added.id, {added.features, HashOf(*added.features), added.world_from_camera, added.scale, added.parent,
                                   std::vector<LandmarkId>(num_keypoints), {}});
     hash_ += HashOf(added.id, keyframe);
   }
@@ -117,6 +128,7 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     if (keyframe == nullptr) return Name(moved.id) + " is not there to be moved";
     hash_ -= HashOf(moved.id, *keyframe);
     keyframe->world_from_camera = moved.world_from_camera;
+    keyframe->scale = moved.scale;
     hash_ += HashOf(moved.id, *keyframe);
   }
   for (const auto& [id, landmark] : delta.changed_landmarks) {
@@ -157,6 +169,10 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     }
     hash_ -= HashOf(id, *keyframe);
     keyframes_.Remove(id);
+  }
+  for (const ClosedLoop& loop : delta.closed_loops) {
+    hash_ += HashOf(closed_loops_.size(), loop);
+    closed_loops_.push_back(loop);
   }
   return "";
 }
@@ -235,7 +251,8 @@ MapDelta Map::Snapshot() const {
   delta.is_snapshot = true;
   delta.hash = hash_;
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-    delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features});
+    delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features,
+                                   keyframe.scale});
   });
   landmarks_.ForEach([&](LandmarkId id, const Landmark& landmark) {
     delta.changed_landmarks.push_back({id, landmark});
@@ -243,6 +260,7 @@ MapDelta Map::Snapshot() const {
       delta.new_observations.push_back({id, observation});
     }
   });
+  delta.closed_loops = closed_loops_;
   return delta;
 }
 
@@ -254,7 +272,7 @@ std::string Map::Sha256Hex() const {
     sha.Add(keyframe.parent.value);
     const Eigen::Quaterniond& q = keyframe.world_from_camera.rotation;
     const Eigen::Vector3d& t = keyframe.world_from_camera.translation;
-    for (const double number : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) sha.Add(number);
+    for (const double number : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), keyframe.scale}) sha.Add(number);
     for (const LandmarkId landmark : keyframe.landmarks) sha.Add(landmark.value);
   });
   landmarks_.ForEach([&](LandmarkId id, const Landmark& landmark) {

@@ -37,13 +37,30 @@ struct Landmark {
 };
 
 // A keyframe in the map: its features never change, its pose does.
+//
+// Closing a loop of mono changes the scale of the map, by another factor at each keyframe. What was measured relative to
+// a keyframe (poses of frames) stays true in the units of that time: those of its map part when it began.
 struct Keyframe {
   std::shared_ptr<const FeatureFrame> features;
   uint64_t features_hash = 0;  // of their exact content
   Rigid3 world_from_camera;
+  double scale = 1.0;  // length of such a unit in today's world; always 1 but for mono
+
+  // Places what was measured relative to the keyframe, in the units of that time.
+  Sim3 WorldFromKeyframe() const { return Sim3::From(world_from_camera, scale); }
+
   KeyframeId parent;  // spanning tree: the older keyframe that shared most landmarks at birth; invalid: the root
   std::vector<LandmarkId> landmarks;         // by keypoint; invalid: none
   std::map<KeyframeId, int32_t> covisible;   // keyframes that share landmarks, and how many
+};
+
+// Two keyframes that see the same place, and by which the map was bent so that they agree.
+struct ClosedLoop {
+  KeyframeId current;      // the one that came back
+  KeyframeId matched;      // the older one
+  double scale = 1.0;      // mono: by which the surroundings of `current` were enlarged
+  int32_t num_points = 0;  // landmarks that both see
+  bool operator==(const ClosedLoop&) const = default;
 };
 
 // One numbered change of the map. The lists are applied in the order in which they stand here.
@@ -53,10 +70,12 @@ struct MapDelta {
     KeyframeId parent;
     Rigid3 world_from_camera;
     std::shared_ptr<const FeatureFrame> features;
+    double scale = 1.0;
   };
   struct MovedKeyframe {
     KeyframeId id;
     Rigid3 world_from_camera;
+    double scale = 1.0;
   };
   struct ChangedLandmark {
     LandmarkId id;
@@ -83,6 +102,8 @@ struct MapDelta {
   std::vector<ChangedParent> changed_parents;
   std::vector<LandmarkId> removed_landmarks;  // must have no observations left
   std::vector<KeyframeId> removed_keyframes;  // likewise
+  std::vector<ClosedLoop> closed_loops;
+  bool asks_adjustment = false;               // what the global adjuster makes of the map after this delta is waited for
   uint64_t hash = 0;                          // of the map after this delta
 };
 
@@ -104,6 +125,8 @@ class Map {
   const std::vector<Observation>& ObservationsOf(LandmarkId id) const;
   const IdMap<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   const IdMap<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
+  // In the order in which they were closed. Their keyframes stay in the map.
+  const std::vector<ClosedLoop>& closed_loops() const { return closed_loops_; }
 
   // Keyframes that share at least `min_shared` landmarks with `id`, most first, ties by lower id, at most `max_num`.
   std::vector<KeyframeId> Covisible(KeyframeId id, int max_num, int min_shared = 1) const;
@@ -124,6 +147,7 @@ class Map {
   IdMap<KeyframeId, Keyframe> keyframes_;
   IdMap<LandmarkId, Landmark> landmarks_;
   IdMap<LandmarkId, std::vector<Observation>> observations_;
+  std::vector<ClosedLoop> closed_loops_;
   int64_t next_delta_ = 0;
   KeyframeId answered_;
   uint64_t hash_ = 0;

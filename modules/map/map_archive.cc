@@ -5,35 +5,47 @@
 
 namespace tessera {
 
-void MapArchive::Add(std::shared_ptr<const MapDelta> delta) {
+void MapArchive::Begin(const Map& map) { snapshots_.push_back(map.Snapshot()); }
+
+void MapArchive::Add(std::shared_ptr<const MapDelta> delta, const Map& map) {
+  const int64_t number = delta->number;
   deltas_.push_back(std::move(delta));
-  if (deltas_.size() > kMaxDeltas) deltas_.pop_front();
+  if ((number + 1) % kSnapshotInterval != 0) return;
+  snapshots_.push_back(map.Snapshot());
+  if (snapshots_.size() <= 2) return;
+  snapshots_.pop_front();
+  while (deltas_.front()->number <= snapshots_.front().number) deltas_.pop_front();
 }
 
 MapArchive::Answer MapArchive::AnswerTo(const MapRequest& request, const Map& map) {
   Answer answer;
-  if (deltas_.empty()) return answer;
+  if (map.next_delta() == 0) return answer;
   if (request.snapshot >= 0) {
-    const auto held = std::find_if(snapshots_.begin(), snapshots_.end(),
-                                   [&](const MapDelta& snapshot) { return snapshot.number == request.snapshot; });
+    const auto has_number = [&](const MapDelta& snapshot) { return snapshot.number == request.snapshot; };
+    const auto held = std::find_if(snapshots_.begin(), snapshots_.end(), has_number);
+    const MapDelta* snapshot = held != snapshots_.end()                ? &*held
+                               : newest_ && has_number(*newest_) ? &*newest_
+                                                                       : nullptr;
     // One that is gone is replaced by a newer one, from its beginning.
-    const bool is_there = held != snapshots_.end() && request.page >= 0 && request.page < NumSnapshotPages(*held);
-    answer.page = is_there ? CutSnapshotPage(*held, request.page) : CutSnapshotPage(NewSnapshot(map), 0);
-  } else if (request.next_delta < deltas_.front()->number || request.next_delta > map.next_delta()) {
-    answer.page = CutSnapshotPage(NewSnapshot(map), 0);
-  } else {
-    std::copy_if(deltas_.begin(), deltas_.end(), std::back_inserter(answer.deltas),
-                 [&](const auto& delta) { return delta->number >= request.next_delta; });
+    const bool is_there = snapshot != nullptr && request.page >= 0 && request.page < NumSnapshotPages(*snapshot);
+    answer.page = is_there ? CutSnapshotPage(*snapshot, request.page) : CutSnapshotPage(SnapshotFor(map), 0);
+    return answer;
+  }
+  const int64_t first_kept = deltas_.empty() ? map.next_delta() : deltas_.front()->number;
+  if (request.next_delta < first_kept || request.next_delta > map.next_delta()) {
+    answer.page = CutSnapshotPage(SnapshotFor(map), 0);
+    return answer;
+  }
+  for (const auto& delta : deltas_) {
+    if (delta->number >= request.next_delta && answer.deltas.size() < kMaxDeltas) answer.deltas.push_back(delta);
   }
   return answer;
 }
 
-const MapDelta& MapArchive::NewSnapshot(const Map& map) {
-  if (snapshots_.empty() || snapshots_.back().number + 1 != map.next_delta()) {
-    snapshots_.push_back(map.Snapshot());
-    if (snapshots_.size() > kMaxSnapshots) snapshots_.pop_front();
-  }
-  return snapshots_.back();
+const MapDelta& MapArchive::SnapshotFor(const Map& map) {
+  if (!snapshots_.empty()) return snapshots_.front();
+  if (!newest_ || newest_->number + 1 != map.next_delta()) newest_ = map.Snapshot();
+  return *newest_;
 }
 
 }  // namespace tessera

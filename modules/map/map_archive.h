@@ -1,4 +1,7 @@
 // The owner's answers to followers that lack something: its last deltas once more, or a snapshot page by page.
+//
+// Snapshots are of some time ago, and the deltas since are kept: a follower that was killed and comes back may have to
+// repeat what it did on the map as it was then.
 #pragma once
 
 #include <cstddef>
@@ -18,22 +21,26 @@ class MapArchive {
     std::optional<MapSnapshotPage> page;
   };
 
-  // A delta was sent.
-  void Add(std::shared_ptr<const MapDelta> delta);
+  // The owner began with this map.
+  void Begin(const Map& map);
+  // A delta was sent; `map` is the owner's after it.
+  void Add(std::shared_ptr<const MapDelta> delta, const Map& map);
   // What to send to one who asks; `map` is the owner's, after the last delta added. Nothing if the asker lacks nothing,
   // or if there is no map yet.
   Answer AnswerTo(const MapRequest& request, const Map& map);
 
-  // A follower that lacks no more than so many deltas gets these; one that lacks more, a snapshot.
+  // A snapshot is taken this often, in deltas. The one handed out is between one and two such intervals old, if the map
+  // is: more than the mapper waits for anybody.
+  static constexpr int64_t kSnapshotInterval = 48;
+  // Deltas sent for one request; who lacks more asks again.
   static constexpr size_t kMaxDeltas = 16;
-  // Several followers may be in the middle of different ones. Features are shared with the map, so these cost little.
-  static constexpr size_t kMaxSnapshots = 2;
 
  private:
-  const MapDelta& NewSnapshot(const Map& map);
+  const MapDelta& SnapshotFor(const Map& map);
 
-  std::deque<std::shared_ptr<const MapDelta>> deltas_;
-  std::deque<MapDelta> snapshots_;  // the newest last
+  std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest snapshot
+  std::deque<MapDelta> snapshots_;                      // features are shared with the map, so these cost little
+  std::optional<MapDelta> newest_;                      // for one whose replica went wrong before there were any
 };
 
 }  // namespace tessera

@@ -13,15 +13,20 @@ void MapEditor::Apply(MapDelta&& part) {
   }
 }
 
-void MapEditor::AddKeyframe(KeyframeId id, KeyframeId parent, const Rigid3& world_from_camera,
+void MapEditor::AddKeyframe(KeyframeId id, KeyframeId parent, const Sim3& world_from_keyframe,
                             std::shared_ptr<const FeatureFrame> features) {
-  const MapDelta::NewKeyframe added{id, parent, world_from_camera, std::move(features)};
+  const MapDelta::NewKeyframe added{id, parent, world_from_keyframe.Pose(), std::move(features),
+                                      world_from_keyframe.scale};
   Apply({.new_keyframes = {added}});
   new_keyframes_[id] = added;
 }
 
 void MapEditor::MoveKeyframe(KeyframeId id, const Rigid3& world_from_camera) {
-  Apply({.moved_keyframes = {{id, world_from_camera}}});
+  MoveKeyframe(id, Sim3::From(world_from_camera, map_.FindKeyframe(id)->scale));
+}
+
+void MapEditor::MoveKeyframe(KeyframeId id, const Sim3& world_from_keyframe) {
+  Apply({.moved_keyframes = {{id, world_from_keyframe.Pose(), world_from_keyframe.scale}}});
   changed_poses_.insert(id);
 }
 
@@ -100,15 +105,22 @@ void MapEditor::RemoveObservation(LandmarkId landmark, const Observation& observ
   reobserved_.insert(landmark);
 }
 
+void MapEditor::AddClosedLoop(const ClosedLoop& loop) {
+  Apply({.closed_loops = {loop}});
+  closed_loops_.push_back(loop);
+}
+
 MapDelta MapEditor::Finish(KeyframeId answers) {
   MapDelta delta;
   delta.number = number_;
+  delta.closed_loops = closed_loops_;
   delta.answers = answers;
   for (const auto& [id, added] : new_keyframes_) {
     delta.new_keyframes.push_back(added);
   }
   for (const KeyframeId id : changed_poses_) {
-    delta.moved_keyframes.push_back({id, map_.FindKeyframe(id)->world_from_camera});
+    const Keyframe& keyframe = *map_.FindKeyframe(id);
+    delta.moved_keyframes.push_back({id, keyframe.world_from_camera, keyframe.scale});
   }
   for (const LandmarkId id : changed_landmarks_) {
     delta.changed_landmarks.push_back({id, *map_.FindLandmark(id)});

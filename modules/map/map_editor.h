@@ -19,9 +19,11 @@ class MapEditor {
 
   const Map& map() const { return map_; }
 
-  void AddKeyframe(KeyframeId id, KeyframeId parent, const Rigid3& world_from_camera,
+  void AddKeyframe(KeyframeId id, KeyframeId parent, const Sim3& world_from_keyframe,
                    std::shared_ptr<const FeatureFrame> features);
+  // Its scale stays.
   void MoveKeyframe(KeyframeId id, const Rigid3& world_from_camera);
+  void MoveKeyframe(KeyframeId id, const Sim3& world_from_keyframe);
   void SetParent(KeyframeId id, KeyframeId parent);
   // Its observations go with it. Its children must have another parent by the time of Finish().
   void RemoveKeyframe(KeyframeId id);
@@ -37,6 +39,8 @@ class MapEditor {
   // The keyframe must not see the landmark yet, nor the keypoint another one.
   void AddObservation(LandmarkId landmark, const Observation& observation);
   void RemoveObservation(LandmarkId landmark, const Observation& observation);
+
+  void AddClosedLoop(const ClosedLoop& loop);
 
   // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
   const std::set<LandmarkId>& touched_landmarks() const { return touched_; }
@@ -54,6 +58,7 @@ class MapEditor {
   std::map<KeyframeId, MapDelta::NewKeyframe> new_keyframes_;
   std::set<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
   std::set<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_, reobserved_;
+  std::vector<ClosedLoop> closed_loops_;
   std::map<std::pair<LandmarkId, Observation>, int> observations_;  // +1: new, -1: removed, 0: taken back
 };
 

@@ -18,6 +18,11 @@ void CopyPage(const std::vector<Item>& all, size_t page, size_t per_page, std::v
   part->assign(all.begin() + static_cast<std::ptrdiff_t>(begin), all.begin() + static_cast<std::ptrdiff_t>(end));
 }
 
+template <class Item>
+void Append(const std::vector<Item>& part, std::vector<Item>* whole) {
+  whole->insert(whole->end(), part.begin(), part.end());
+}
+
 }  // namespace
 
 int32_t NumSnapshotPages(const MapDelta& snapshot) {
@@ -36,6 +41,7 @@ MapSnapshotPage CutSnapshotPage(const MapDelta& snapshot, int32_t page) {
   cut.part.answers = snapshot.answers;
   cut.part.is_snapshot = true;
   cut.part.hash = snapshot.hash;
+  if (page == 0) cut.part.closed_loops = snapshot.closed_loops;
   auto left = static_cast<size_t>(page);
   const size_t num_keyframe_pages = NumPages(snapshot.new_keyframes.size(), kKeyframesPerPage);
   const size_t num_landmark_pages = NumPages(snapshot.changed_landmarks.size(), kLandmarksPerPage);
@@ -48,6 +54,12 @@ MapSnapshotPage CutSnapshotPage(const MapDelta& snapshot, int32_t page) {
     CopyPage(snapshot.new_observations, left, kObservationsPerPage, &cut.part.new_observations);
   }
   return cut;
+}
+
+void AppendPage(const MapSnapshotPage& page, MapDelta* snapshot) {
+  Append(page.part.new_keyframes, &snapshot->new_keyframes);
+  Append(page.part.changed_landmarks, &snapshot->changed_landmarks);
+  Append(page.part.new_observations, &snapshot->new_observations);
 }
 
 }  // namespace tessera

@@ -29,4 +29,7 @@ int32_t NumSnapshotPages(const MapDelta& snapshot);
 // Page 0 .. NumSnapshotPages() - 1.
 MapSnapshotPage CutSnapshotPage(const MapDelta& snapshot, int32_t page);
 
+// Adds the next page to those before it.
+void AppendPage(const MapSnapshotPage& page, MapDelta* snapshot);
+
 }  // namespace tessera

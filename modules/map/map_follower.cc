@@ -3,14 +3,6 @@
 #include <utility>
 
 namespace tessera {
-namespace {
-
-template <class Item>
-void Append(const std::vector<Item>& part, std::vector<Item>* whole) {
-  whole->insert(whole->end(), part.begin(), part.end());
-}
-
-}  // namespace
 
 void MapFollower::Receive(Delta delta) {
   // What follows a snapshot that is on its way may have a number that was given out before.
@@ -32,9 +24,7 @@ void MapFollower::Receive(const MapSnapshotPage& page) {
              page.part.number != collected_->whole.number) {
     return;
   } else {
-    Append(page.part.new_keyframes, &collected_->whole.new_keyframes);
-    Append(page.part.changed_landmarks, &collected_->whole.changed_landmarks);
-    Append(page.part.new_observations, &collected_->whole.new_observations);
+    AppendPage(page, &collected_->whole);
   }
   if (++collected_->next_page == collected_->num_pages) Complete();
 }

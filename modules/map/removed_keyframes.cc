@@ -19,20 +19,20 @@ void RemovedKeyframes::Remember(const Map& map, const MapDelta& delta) {
 void RemovedKeyframes::Remember(const Map& map, KeyframeId id) {
   const Keyframe* keyframe = map.FindKeyframe(id);
   if (keyframe == nullptr) return;
-  if (const std::optional<Rigid3> world_from_parent = Find(map, keyframe->parent)) {
-    ties_[id] = {keyframe->parent, world_from_parent->Inverse() * keyframe->world_from_camera};
+  if (const std::optional<Sim3> world_from_parent = Find(map, keyframe->parent)) {
+    ties_[id] = {keyframe->parent, world_from_parent->Inverse() * keyframe->WorldFromKeyframe()};
   }
 }
 
-std::optional<Rigid3> RemovedKeyframes::Find(const Map& map, KeyframeId id) const {
-  Rigid3 ancestor_from_camera;
+std::optional<Sim3> RemovedKeyframes::Find(const Map& map, KeyframeId id) const {
+  Sim3 ancestor_from_keyframe;
   while (true) {
     if (const Keyframe* keyframe = map.FindKeyframe(id); keyframe != nullptr) {
-      return keyframe->world_from_camera * ancestor_from_camera;
+      return keyframe->WorldFromKeyframe() * ancestor_from_keyframe;
     }
     const auto tie = ties_.find(id);
     if (tie == ties_.end()) return std::nullopt;
-    ancestor_from_camera = tie->second.parent_from_camera * ancestor_from_camera;
+    ancestor_from_keyframe = tie->second.parent_from_keyframe * ancestor_from_keyframe;
     id = tie->second.parent;
   }
 }

@@ -17,15 +17,15 @@ class RemovedKeyframes {
   // Ties one keyframe of the map to its parent.
   void Remember(const Map& map, KeyframeId id);
 
-  // world_from_camera of a keyframe that is in the map or has been there; nullopt of one that never was.
-  std::optional<Rigid3> Find(const Map& map, KeyframeId id) const;
+  // Keyframe::WorldFromKeyframe of one that is in the map or has been there; nullopt of one that never was.
+  std::optional<Sim3> Find(const Map& map, KeyframeId id) const;
   // The keyframe of the map that `id` is tied to: itself if it is there. Invalid if it never was.
   KeyframeId Successor(const Map& map, KeyframeId id) const;
 
  private:
   struct Tie {
     KeyframeId parent;
-    Rigid3 parent_from_camera;
+    Sim3 parent_from_keyframe;
   };
   std::map<KeyframeId, Tie> ties_;
 };

@@ -18,9 +18,9 @@ void DeltaSchedule::Receive(Delta delta) {
 }
 
 void DeltaSchedule::SkipTo(const MapDelta& snapshot) {
-  while (!held_.empty() && held_.front()->number <= snapshot.number) held_.pop_front();
-  next_delta_ = std::max(next_delta_, snapshot.number + 1);
-  answered_ = std::max(answered_, snapshot.answers);
+  held_.clear();
+  next_delta_ = snapshot.number + 1;
+  answered_ = snapshot.answers;
 }
 
 // The last keyframe of the frames up to `frame - delay_frames`.

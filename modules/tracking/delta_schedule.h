@@ -32,7 +32,7 @@ class DeltaSchedule {
   void KeyframeSent(KeyframeId id, FrameId at);
   // The next delta came in (MapFollower puts them in order). One that is held already changes nothing.
   void Receive(Delta delta);
-  // A snapshot was applied, in place of all deltas up to its number.
+  // A snapshot was applied, in place of all deltas up to its number; those after it will be received (again).
   void SkipTo(const MapDelta& snapshot);
 
   bool follows_logical_time() const { return std::holds_alternative<Delayed>(rule_); }

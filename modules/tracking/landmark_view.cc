@@ -1,5 +1,7 @@
 #include "tracking/landmark_view.h"
 
+#include <algorithm>
+
 #include <cmath>
 #include <numbers>
 
@@ -17,6 +19,23 @@ double Baseline(const CameraCalibration& calibration) {
       return kRgbdBaseline;
   }
   return 0.0;
+}
+
+std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe) {
+  const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
+  std::vector<double> depths;
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (!id.valid()) continue;
+    const double z = (camera_from_world * map.FindLandmark(id)->position_in_world).z();
+    if (z > 0.0) depths.push_back(z);
+  }
+  std::sort(depths.begin(), depths.end());
+  return depths;
+}
+
+double MedianDepth(const Map& map, const Keyframe& keyframe) {
+  const std::vector<double> depths = LandmarkDepths(map, keyframe);
+  return depths.empty() ? 1.0 : depths[depths.size() / 2];
 }
 
 FeatureGrid MakeGrid(const FeatureFrame& features) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "features/feature_types.h"
 #include "geometry/reprojection.h"
@@ -21,6 +22,11 @@ inline constexpr double kKeypointSigmaPx = 0.7;
 // use (Kinect, Xtion). The stereo baseline for a stereo camera; 0 for mono.
 inline constexpr double kRgbdBaseline = 0.075;
 double Baseline(const CameraCalibration& calibration);
+
+// Depths (z) of the landmarks in front of a keyframe that it sees, rising.
+std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe);
+// Their median; 1 if there are none.
+double MedianDepth(const Map& map, const Keyframe& keyframe);
 
 // The features' keypoints by place.
 FeatureGrid MakeGrid(const FeatureFrame& features);

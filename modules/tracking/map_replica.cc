@@ -2,9 +2,11 @@
 
 namespace tessera {
 
-Landmark InWorld(const Rigid3& world_from_camera, Landmark point) {
-  point.position_in_world = world_from_camera * point.position_in_world;
-  point.normal = world_from_camera.rotation * point.normal;
+Landmark InWorld(const Sim3& world_from_keyframe, Landmark point) {
+  point.position_in_world = world_from_keyframe * point.position_in_world;
+  point.normal = world_from_keyframe.rotation * point.normal;
+  point.min_distance *= world_from_keyframe.scale;
+  point.max_distance *= world_from_keyframe.scale;
   return point;
 }
 
@@ -15,16 +17,16 @@ std::string MapReplica::Apply(const MapDelta& delta) {
   return problem;
 }
 
-std::optional<Rigid3> MapReplica::PoseOf(KeyframeId id) const {
-  Rigid3 ancestor_from_camera;
+std::optional<Sim3> MapReplica::PlaceOf(KeyframeId id) const {
+  Sim3 ancestor_from_keyframe;
   for (auto sent = sent_.find(id); sent != sent_.end(); sent = sent_.find(id)) {
-    ancestor_from_camera = sent->second.reference_from_camera * ancestor_from_camera;
+    ancestor_from_keyframe = Sim3::From(sent->second.reference_from_camera) * ancestor_from_keyframe;
     id = sent->second.reference;
-    if (!id.valid()) return ancestor_from_camera;
+    if (!id.valid()) return ancestor_from_keyframe;
   }
-  const std::optional<Rigid3> world_from_ancestor = removed_.Find(map_, id);
+  const std::optional<Sim3> world_from_ancestor = removed_.Find(map_, id);
   if (!world_from_ancestor) return std::nullopt;
-  return *world_from_ancestor * ancestor_from_camera;
+  return *world_from_ancestor * ancestor_from_keyframe;
 }
 
 std::optional<Landmark> MapReplica::Find(const PointId& id) const {
@@ -35,9 +37,9 @@ std::optional<Landmark> MapReplica::Find(const PointId& id) const {
   const auto sent = sent_.find(id.keyframe);
   if (sent == sent_.end()) return std::nullopt;
   const auto point = sent->second.points.find(id.keypoint);
-  const std::optional<Rigid3> pose = PoseOf(id.keyframe);
-  if (point == sent->second.points.end() || !pose) return std::nullopt;
-  return InWorld(*pose, point->second);
+  const std::optional<Sim3> place = PlaceOf(id.keyframe);
+  if (point == sent->second.points.end() || !place) return std::nullopt;
+  return InWorld(*place, point->second);
 }
 
 PointId MapReplica::Renew(const PointId& id) const {
@@ -50,10 +52,10 @@ PointId MapReplica::Renew(const PointId& id) const {
 std::vector<std::pair<PointId, Landmark>> MapReplica::SentPoints() const {
   std::vector<std::pair<PointId, Landmark>> points;
   for (const auto& [id, keyframe] : sent_) {
-    const std::optional<Rigid3> pose = PoseOf(id);
-    if (!pose) continue;
+    const std::optional<Sim3> place = PlaceOf(id);
+    if (!place) continue;
     for (const auto& [keypoint, point] : keyframe.points) {
-      points.emplace_back(PointId{{}, id, keypoint}, InWorld(*pose, point));
+      points.emplace_back(PointId{{}, id, keypoint}, InWorld(*place, point));
     }
   }
   return points;

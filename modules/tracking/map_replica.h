@@ -23,14 +23,14 @@ struct PointId {
   auto operator<=>(const PointId&) const = default;
 };
 
-// The landmark of a camera's frame in the world's.
-Landmark InWorld(const Rigid3& world_from_camera, Landmark point_in_camera);
+// The landmark of a keyframe's frame and units in the world's.
+Landmark InWorld(const Sim3& world_from_keyframe, Landmark point_in_keyframe);
 
 // A keyframe on its way to the mapper.
 struct SentKeyframe {
   KeyframeId reference;          // invalid: the first of a part
-  Rigid3 reference_from_camera;  // world_from_camera for the first of a part
-  std::map<int32_t, Landmark> points;  // by keypoint: placed by the tracker, in the frame of the camera
+  Rigid3 reference_from_camera;  // in the reference's units; world_from_camera for the first of a part
+  std::map<int32_t, Landmark> points;  // by keypoint: placed by the tracker, in the keyframe's frame and units
 };
 
 class MapReplica {
@@ -42,8 +42,9 @@ class MapReplica {
   const Map& map() const { return map_; }
   const std::map<KeyframeId, SentKeyframe>& sent() const { return sent_; }
 
-  // world_from_camera of a keyframe of the map, one that was removed from it, or one on its way.
-  std::optional<Rigid3> PoseOf(KeyframeId id) const;
+  // Keyframe::WorldFromKeyframe of a keyframe of the map, one that was removed from it, or one on its way, which has the
+  // units of its reference.
+  std::optional<Sim3> PlaceOf(KeyframeId id) const;
   // The point in world coordinates; nullopt if it is gone.
   std::optional<Landmark> Find(const PointId& id) const;
   // The same point under its present name: its landmark once the mapper answered. Invalid if it is gone.

@@ -41,7 +41,13 @@ MapTracker::MapTracker(const MapTrackerOptions& options)
   if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
 }
 
-MapTrackingResult MapTracker::Track(const FeatureFrame& features) {
+std::string MapTracker::ApplyDelta(const MapDelta& delta) {
+  // Keyframes of a map that was loaded have numbers too.
+  if (delta.is_snapshot) next_keyframe_.value = std::max(next_keyframe_.value, delta.answers.value + 1);
+  return replica_.Apply(delta);
+}
+
+MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
   const auto view = std::make_shared<const FrameView>(features, options_.sigma_px, kRgbdBaseline);
   MapTrackingResult result;
   PoseEstimate& pose = result.pose;
@@ -50,24 +56,32 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features) {
   pose.arrival_us = features.arrival_us;
   pose.num_features = view->size();
   pose.num_landmarks = static_cast<int32_t>(replica_.map().landmarks().size());
-  if (!last_) {
+  const bool has_map = replica_.map().keyframes().size() > 0;
+  const bool was_lost = lost_since_us_.has_value() || (!last_ && has_map);
+  if (last_) RenewLast();
+  if (answer != nullptr && TakeAnswer(*answer, view)) pose.relocalized_by = answer->frame;
+
+  TrackedFrame frame(view);
+  if (last_ && (last_->frame.view == view || Place(frame))) {
+    if (last_->frame.view != view) Remember(std::move(frame));
+    pose.num_matches = last_->frame.NumPoints();
+    pose.is_relocalized = was_lost;
+    pose.state = TrackingState::kTracked;
+    if (options_.makes_keyframes && IsKeyframeDue()) {
+      result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
+    }
+  } else if (may_ask && has_map && view->size() >= options_.min_relocalised_inliers) {
+    asked_ = view;
+    result.asks_relocalization = true;
+    return result;
+  } else if (!has_map && !last_) {
     pose.state = Start(view, result.keyframes) ? TrackingState::kTracked : TrackingState::kInitializing;
   } else {
-    RenewLast();
-    TrackedFrame frame(view);
-    if (Place(frame)) {
-      pose.num_matches = frame.NumPoints();
-      Remember(std::move(frame));
-      if (IsKeyframeDue()) {
-        result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
-      }
-      pose.state = TrackingState::kTracked;
-    } else {
-      NoteLoss(features.utime_us);
-      pose.state = TrackingState::kLost;
-    }
+    const bool has_started = NoteLoss(features.utime_us) && Start(view, result.keyframes);
+    pose.state = has_started ? TrackingState::kTracked : TrackingState::kLost;
   }
   if (pose.state == TrackingState::kTracked) {
+    lost_since_us_.reset();
     pose.world_from_camera = last_->frame.world_from_camera;
     pose.reference_keyframe = reference_;
     pose.reference_from_camera = last_->reference_from_camera;
@@ -111,7 +125,7 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
     const Landmark placed = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
     sent.points[point.keypoint_first] = placed;
     second.points[Index(point.keypoint_second)] = {{{}, first_id, point.keypoint_first},
-                                                   InWorld(part_from_world_, placed)};
+                                                   InWorld(Sim3::From(part_from_world_), placed)};
   }
   replica_.Send(first_id, std::move(sent));
   last_.emplace(Last{std::move(second), Rigid3::Identity()});
@@ -122,8 +136,8 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
 // The last frame keeps its place relative to its reference, and its points take their newest places.
 void MapTracker::RenewLast() {
   decision_.Renew(replica_);
-  if (const std::optional<Rigid3> world_from_reference = replica_.PoseOf(reference_)) {
-    last_->frame.world_from_camera = *world_from_reference * last_->reference_from_camera;
+  if (const std::optional<Sim3> world_from_reference = replica_.PlaceOf(reference_)) {
+    last_->frame.world_from_camera = (*world_from_reference * last_->reference_from_camera).Pose();
   }
   for (SeenPoint& point : last_->frame.points) {
     if (!point.valid()) continue;
@@ -145,8 +159,10 @@ bool MapTracker::Place(TrackedFrame& frame) const {
 
 bool MapTracker::FollowLast(TrackedFrame& frame) const {
   const Rigid3 last_from_current = current_from_last_.value_or(Rigid3::Identity()).Inverse();
+  const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
+  const Sim3 world_from_reference = replica_.PlaceOf(reference_).value_or(Sim3{});
   for (const double widening : {1.0, 2.0, 4.0}) {
-    frame.world_from_camera = last_->frame.world_from_camera * last_from_current;
+    frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
     const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
     if (num >= options_.min_last_matches && OptimizeFrame(frame) >= options_.min_last_matches / 2) return true;
   }
@@ -171,6 +187,31 @@ bool MapTracker::Relocalise(TrackedFrame& frame) const {
   if (!pose) return false;
   frame.world_from_camera = pose->camera_from_world.Inverse();
   return OptimizeFrame(frame) >= options_.min_last_matches / 2;
+}
+
+// The frame that asked, this one or one before, becomes the last that was tracked. False if the answer does not hold in
+// this map.
+bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& view) {
+  const Frame asked = view->features().frame == answer.frame ? view : asked_;
+  const std::optional<Sim3> world_from_reference = replica_.PlaceOf(answer.reference);
+  if (!world_from_reference || asked == nullptr || asked->features().frame != answer.frame) return false;
+  TrackedFrame frame(asked);
+  frame.world_from_camera = (*world_from_reference * answer.reference_from_camera).Pose();
+  for (const SeenLandmark& seen : answer.seen) {
+    const Landmark* landmark = replica_.map().FindLandmark(seen.landmark);
+    if (landmark != nullptr && seen.keypoint < frame.view->size()) {
+      frame.points[Index(seen.keypoint)] = {{seen.landmark, {}, -1}, *landmark};
+    }
+  }
+  if (OptimizeFrame(frame) < options_.min_relocalised_inliers / 2) return false;
+  MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
+  if (OptimizeFrame(frame) < options_.min_relocalised_inliers) return false;
+  reference_ = answer.reference;
+  decision_.Restart(frame);
+  const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
+  current_from_last_.reset();
+  last_.emplace(Last{std::move(frame), reference_from_camera});
+  return true;
 }
 
 // Refines the pose on the points seen, and forgets those that disagree. Returns how many are left.
@@ -243,21 +284,24 @@ PlacedPoints MapTracker::LocalPoints(const TrackedFrame& frame) const {
 }
 
 void MapTracker::Remember(TrackedFrame frame) {
+  const Sim3 reference_from_world = replica_.PlaceOf(reference_).value_or(Sim3{}).Inverse();
+  const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   current_from_last_.reset();
-  if (!lost_since_us_) current_from_last_ = frame.world_from_camera.Inverse() * last_->frame.world_from_camera;
+  if (!lost_since_us_) current_from_last_ = reference_from_camera.Inverse() * last_->reference_from_camera;
   lost_since_us_.reset();
-  const Rigid3 world_from_reference = replica_.PoseOf(reference_).value_or(Rigid3::Identity());
-  const Rigid3 reference_from_camera = world_from_reference.Inverse() * frame.world_from_camera;
   last_.emplace(Last{std::move(frame), reference_from_camera});
 }
 
-void MapTracker::NoteLoss(int64_t utime_us) {
+// Whether it has lasted so long that a new part of the map should begin.
+bool MapTracker::NoteLoss(int64_t utime_us) {
   if (!lost_since_us_) lost_since_us_ = utime_us;
-  if (utime_us - *lost_since_us_ <= options_.max_lost_us) return;
-  part_from_world_ = last_->frame.world_from_camera;
-  last_.reset();
-  lost_since_us_.reset();
-  initializer_ = MonoInitializer(options_.start);
+  if (utime_us - *lost_since_us_ <= options_.max_lost_us || !options_.makes_keyframes) return false;
+  if (last_) {
+    part_from_world_ = last_->frame.world_from_camera;
+    last_.reset();
+    initializer_ = MonoInitializer(options_.start);
+  }
+  return true;
 }
 
 bool MapTracker::IsKeyframeDue() {
@@ -269,7 +313,7 @@ bool MapTracker::IsKeyframeDue() {
     if (!point || point->z() > near_m) continue;
     (frame.points[Index(i)].valid() ? near.num_known : near.num_new) += 1;
   }
-  const Rigid3 world_from_reference = frame.world_from_camera * last_->reference_from_camera.Inverse();
+  const Rigid3 world_from_reference = replica_.PlaceOf(reference_).value_or(Sim3{}).Pose();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
   const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near);
   return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;
@@ -289,9 +333,9 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
     const SeenPoint& point = frame.points[i];
     keyframe.landmarks[i] = point.id.landmark;
     if (point.id.keyframe.valid()) {
-      const auto keypoint = static_cast<int32_t>(i);
-      keyframe.shared.push_back(
-          {keypoint, point.id.keyframe, point.id.keypoint, point.landmark.position_in_world});
+      const Sim3 other_from_world = replica_.PlaceOf(point.id.keyframe).value_or(Sim3{}).Inverse();
+      keyframe.shared.push_back({static_cast<int32_t>(i), point.id.keyframe, point.id.keypoint,
+                                 other_from_world * point.landmark.position_in_world});
     }
   }
   SentKeyframe sent{reference, reference_from_camera, {}};
@@ -316,7 +360,7 @@ void MapTracker::PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyfra
     if (!point || point->z() > max_depth_m) continue;
     const Landmark placed = PointOf(*frame.view, i, *point);
     sent.points[i] = placed;
-    frame.points[Index(i)] = {{{}, id, i}, InWorld(frame.world_from_camera, placed)};
+    frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), placed)};
   }
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "geometry/pose_optimization.h"
+#include "map/loop_types.h"
 #include "map/tracking_types.h"
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
@@ -34,6 +35,7 @@ struct MapTrackerOptions {
   int min_relocalised_inliers = 50;  // likewise after a loss, where chance has more room
   int max_local_keyframes = 30;      // whose landmarks are looked for
   int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
+  bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
   int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
   double max_depth_baselines = 40.0; // stereo, RGB-D: up to here a keypoint's depth makes a point at once
 
@@ -43,6 +45,9 @@ struct MapTrackerOptions {
 
 struct MapTrackingResult {
   PoseEstimate pose;
+  // Nothing was decided yet: the frame can't be placed from what is around the last one. To be tracked again, with an
+  // answer or without.
+  bool asks_relocalization = false;
   std::vector<KeyframeObservation> keyframes;  // made of this frame: none or one; or the two that mono starts from
 };
 
@@ -52,9 +57,13 @@ class MapTracker {
   explicit MapTracker(const MapTrackerOptions& options);
 
   // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
-  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta) { return replica_.Apply(delta); }
-  // Frames in the order of their numbers; some may be missing. A pure function of the frames and deltas so far.
-  MapTrackingResult Track(const FeatureFrame& features);
+  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
+  // Frames in the order of their numbers; some may be missing. A pure function of the frames, deltas and answers so far.
+  // `answer`: where this frame, or the one that asked last, was taken. `may_ask`: an answer can be had for this frame.
+  MapTrackingResult Track(const FeatureFrame& features, const RelocalizationAnswer* answer = nullptr,
+                          bool may_ask = false);
+  // The last keyframe sent: what a request is about.
+  KeyframeId last_keyframe() const { return {next_keyframe_.value - 1}; }
 
   const Map& map() const { return replica_.map(); }
 
@@ -64,7 +73,7 @@ class MapTracker {
   // What is remembered of the last tracked frame.
   struct Last {
     TrackedFrame frame;
-    Rigid3 reference_from_camera;
+    Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
   };
 
   bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
@@ -72,13 +81,14 @@ class MapTracker {
   bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   void RenewLast();
   bool Place(TrackedFrame& frame) const;
+  bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool FollowLast(TrackedFrame& frame) const;
   bool Relocalise(TrackedFrame& frame) const;
   int OptimizeFrame(TrackedFrame& frame) const;
   std::vector<KeyframeId> LocalKeyframes(const TrackedFrame& frame) const;
   PlacedPoints LocalPoints(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame);
-  void NoteLoss(int64_t utime_us);
+  bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
   void PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
@@ -88,12 +98,13 @@ class MapTracker {
   MonoInitializer initializer_;
   KeyframeDecision decision_;
   std::optional<Last> last_;                 // nullopt: no part of the map is followed
-  std::optional<Rigid3> current_from_last_;  // velocity: motion over the last frame interval
+  std::optional<Rigid3> current_from_last_;  // velocity: motion over the last frame interval, in the reference's units
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
   Rigid3 part_from_world_;                   // world_from_camera where the next part begins
   int64_t previous_utime_us_ = 0;            // of the frame before
   std::optional<int64_t> lost_since_us_;
+  Frame asked_;                              // the frame that asked last
 };
 
 }  // namespace tessera

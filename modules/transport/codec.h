@@ -14,6 +14,7 @@
 
 #include "features/feature_types.h"
 #include "geometry/camera_frame.h"
+#include "map/loop_types.h"
 #include "map/map_exchange.h"
 #include "map/tracking_types.h"
 #include "transport/bytes.h"
@@ -41,6 +42,9 @@ template <>
 inline constexpr Delivery kDelivery<MapSnapshotPage> = Delivery::kFromNow;
 template <>
 inline constexpr Delivery kDelivery<MapRequest> = Delivery::kFromNow;
+// Only one who waits asks, and asks again.
+template <>
+inline constexpr Delivery kDelivery<RelocalizationRequest> = Delivery::kFromNow;
 template <>
 inline constexpr Delivery kDelivery<ExtractorReady> = Delivery::kUnordered;
 template <>

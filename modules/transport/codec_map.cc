@@ -50,9 +50,14 @@ struct Codec<MapDelta> {
   // A snapshot does not travel as one delta, but page by page.
   template <class Emit>
   static void Cut(const MapDelta& delta, Message* message, size_t max_bytes, Emit emit) {
+    message->asks_adjustment = delta.asks_adjustment ? 1 : 0;
     CutParts(delta, message, max_bytes, emit);
   }
-  static std::string Join(const Message& message, MapDelta* delta) { return JoinPart(message, delta); }
+  static std::string Join(const Message& message, MapDelta* delta) {
+    std::string problem = JoinPart(message, delta);
+    delta->asks_adjustment = message.asks_adjustment != 0;
+    return problem;
+  }
 };
 TESSERA_CODEC(MapDelta);
 

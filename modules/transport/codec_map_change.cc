@@ -16,9 +16,10 @@ namespace {
 constexpr size_t kMaxItems = size_t{1} << 24;
 constexpr size_t kMaxNewKeyframes = size_t{1} << 16;
 
-constexpr size_t kBytesPerPose = 4 * 8 + 3 * 8;
+constexpr size_t kBytesPerPose = 4 * 8 + 3 * 8 + 8;
 constexpr size_t kBytesPerLandmark = 8 + 3 * 8 + 3 * 8 + 8 + 8 + 32;
 constexpr size_t kBytesPerObservation = 8 + 8 + 4;
+constexpr size_t kBytesPerLoop = 8 + 8 + 8 + 4;
 
 bool IsWhole(const MapDelta::NewKeyframe& keyframe, int32_t num_total) {
   return keyframe.features->keypoints.size() == static_cast<size_t>(num_total);
@@ -41,7 +42,7 @@ class ChangeJoiner {
                          JoinObservations(First(change_.new_observations, change_.num_new_observations),
                                           &delta_.new_observations),
                          JoinParents(),
-                         JoinRemoved(), Require(NumItems() <= kMaxItems, "it changes more than any mapper would")});
+                         JoinRemoved(), JoinLoops(), Require(NumItems() <= kMaxItems, "it changes more than any mapper would")});
   }
 
  private:
@@ -51,7 +52,7 @@ class ChangeJoiner {
       const bool begins = message.keypoints.first == 0;
       if (begins) {
         if (delta_.new_keyframes.size() >= kMaxNewKeyframes) return "it brings more keyframes than any mapper would";
-        delta_.new_keyframes.push_back({{message.keyframe}, {message.parent}, {}, std::make_shared<FeatureFrame>()});
+        delta_.new_keyframes.push_back({{message.keyframe}, {message.parent}, {}, std::make_shared<FeatureFrame>(), message.scale});
       }
       if (delta_.new_keyframes.empty() || delta_.new_keyframes.back().id.value != message.keyframe) {
         return "the parts of its keyframes do not fit together";
@@ -61,7 +62,7 @@ class ChangeJoiner {
       const auto features = std::const_pointer_cast<FeatureFrame>(added.features);
       const std::string problem = FirstProblem(
           {Require(message.keyframe >= 0 && message.parent >= -1, "a keyframe's number is out of range"),
-           FromMessage(message.world_from_camera, &added.world_from_camera),
+           FromMessage(message.world_from_camera, &added.world_from_camera), CheckScale(message.scale),
            JoinKeypoints(message.keypoints, begins, features.get())});
       if (!problem.empty()) return problem;
       const bool may_go_on = !is_last && &message == &messages.back();
@@ -74,9 +75,10 @@ class ChangeJoiner {
     for (size_t i = 0; i < static_cast<size_t>(change_.num_moved_keyframes); ++i) {
       MapDelta::MovedKeyframe& moved = delta_.moved_keyframes.emplace_back();
       moved.id.value = change_.moved_keyframes[i];
-      if (std::string problem = FromMessage(change_.world_from_camera[i], &moved.world_from_camera); !problem.empty()) {
-        return problem;
-      }
+      moved.scale = change_.scale[i];
+      const std::string problem =
+          FirstProblem({FromMessage(change_.world_from_camera[i], &moved.world_from_camera), CheckScale(moved.scale)});
+      if (!problem.empty()) return problem;
     }
     return "";
   }
@@ -124,10 +126,20 @@ class ChangeJoiner {
     return "";
   }
 
+  std::string JoinLoops() {
+    for (const closed_loop_t& loop : First(change_.closed_loops, change_.num_closed_loops)) {
+      if (loop.current < 0 || loop.matched < 0 || loop.num_points < 0 || !CheckScale(loop.scale).empty()) {
+        return "a closed loop is out of range";
+      }
+      delta_.closed_loops.push_back({{loop.current}, {loop.matched}, loop.scale, loop.num_points});
+    }
+    return "";
+  }
+
   size_t NumItems() const {
     return delta_.moved_keyframes.size() + delta_.changed_landmarks.size() + delta_.removed_observations.size() +
            delta_.new_observations.size() + delta_.changed_parents.size() + delta_.removed_landmarks.size() +
-           delta_.removed_keyframes.size();
+           delta_.removed_keyframes.size() + delta_.closed_loops.size();
   }
 
   const map_change_t& change_;
@@ -147,6 +159,7 @@ class ChangeCutter::Impl {
     Move(delta_.moved_keyframes, 8 + kBytesPerPose, &moved_, [&](const MapDelta::MovedKeyframe& moved) {
       change->moved_keyframes.push_back(moved.id.value);
       change->world_from_camera.push_back(ToMessage(moved.world_from_camera));
+      change->scale.push_back(moved.scale);
     });
     Move(delta_.changed_landmarks, kBytesPerLandmark, &landmarks_,
          [&](const MapDelta::ChangedLandmark& changed) { change->landmarks.push_back(LandmarkMessage(changed)); });
@@ -162,6 +175,13 @@ class ChangeCutter::Impl {
          [&](LandmarkId id) { change->removed_landmarks.push_back(id.value); });
     Move(delta_.removed_keyframes, 8, &removed_keyframes_,
          [&](KeyframeId id) { change->removed_keyframes.push_back(id.value); });
+    Move(delta_.closed_loops, kBytesPerLoop, &closed_loops_, [&](const ClosedLoop& loop) {
+      closed_loop_t& message = change->closed_loops.emplace_back();
+      message.current = loop.current.value;
+      message.matched = loop.matched.value;
+      message.scale = loop.scale;
+      message.num_points = loop.num_points;
+    });
     SetCounts(change);
   }
 
@@ -188,6 +208,7 @@ class ChangeCutter::Impl {
       message.keyframe = added.id.value;
       message.parent = added.parent.value;
       message.world_from_camera = ToMessage(added.world_from_camera);
+      message.scale = added.scale;
       SetFrame(*added.features, &message.keypoints);
       const auto overhead = static_cast<size_t>(message._getEncodedSizeNoHash());
       const size_t num_left = added.features->keypoints.size() - keypoint_;
@@ -231,13 +252,14 @@ class ChangeCutter::Impl {
     change->num_changed_parents = count(change->children);
     change->num_removed_landmarks = count(change->removed_landmarks);
     change->num_removed_keyframes = count(change->removed_keyframes);
+    change->num_closed_loops = count(change->closed_loops);
   }
 
   const MapDelta& delta_;
   size_t room_ = 0;
   bool is_done_ = true;  // with all lists so far
   size_t keyframe_ = 0, keypoint_ = 0, moved_ = 0, landmarks_ = 0, removed_observations_ = 0, new_observations_ = 0,
-         parents_ = 0, removed_landmarks_ = 0, removed_keyframes_ = 0;
+         parents_ = 0, removed_landmarks_ = 0, removed_keyframes_ = 0, closed_loops_ = 0;
 };
 
 ChangeCutter::ChangeCutter(const MapDelta& delta) : impl_(std::make_unique<Impl>(delta)) {}

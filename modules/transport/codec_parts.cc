@@ -99,6 +99,29 @@ std::string FromMessage(const camera_model_t& message, CameraCalibration* calibr
   return calibration->Check();
 }
 
+std::string CheckScale(double scale) {
+  return Require(scale > 1e-9 && scale < 1e9, "its scale is out of range");
+}
+
+sim3_t ToMessage(const Sim3& transform) {
+  const rigid3_t pose = ToMessage(transform.Pose());
+  sim3_t message;
+  message.scale = transform.scale;
+  std::copy(std::begin(pose.rotation_wxyz), std::end(pose.rotation_wxyz), message.rotation_wxyz);
+  std::copy(std::begin(pose.translation), std::end(pose.translation), message.translation);
+  return message;
+}
+
+std::string FromMessage(const sim3_t& message, Sim3* transform) {
+  rigid3_t pose;
+  std::copy(std::begin(message.rotation_wxyz), std::end(message.rotation_wxyz), pose.rotation_wxyz);
+  std::copy(std::begin(message.translation), std::end(message.translation), pose.translation);
+  Rigid3 rigid;
+  const std::string problem = FirstProblem({FromMessage(pose, &rigid), CheckScale(message.scale)});
+  *transform = Sim3::From(rigid, message.scale);
+  return problem;
+}
+
 rigid3_t ToMessage(const Rigid3& transform) {
   const Eigen::Quaterniond& q = transform.rotation;
   rigid3_t message;

@@ -18,6 +18,7 @@
 #include "tessera/image_band_t.hpp"
 #include "tessera/rect_t.hpp"
 #include "tessera/rigid3_t.hpp"
+#include "tessera/sim3_t.hpp"
 
 namespace tessera {
 
@@ -35,6 +36,12 @@ std::string FromMessage(const camera_model_t& message, CameraCalibration* calibr
 rigid3_t ToMessage(const Rigid3& transform);
 // Refuses what is not finite, not within 10^9 m, or whose quaternion is not of length 1.
 std::string FromMessage(const rigid3_t& message, Rigid3* transform);
+
+// Refuses a scale that is not within 10^-9 .. 10^9.
+std::string CheckScale(double scale);
+
+sim3_t ToMessage(const Sim3& transform);
+std::string FromMessage(const sim3_t& message, Sim3* transform);
 
 // A position, m (mono: units of the map). False if it is not finite or not within 10^9.
 void ToMessage(const Eigen::Vector3d& vector, double* message);

@@ -111,7 +111,7 @@ struct Codec<KeyframeObservation> {
       message->shared[i].keypoint = shared.keypoint;
       message->shared[i].other = shared.other.value;
       message->shared[i].other_keypoint = shared.other_keypoint;
-      ToMessage(shared.position_in_world, message->shared[i].position_in_world);
+      ToMessage(shared.position_in_other, message->shared[i].position_in_other);
     }
   }
   static std::string JoinShared(const Message& message, KeyframeObservation* keyframe) {
@@ -123,7 +123,7 @@ struct Codec<KeyframeObservation> {
       const bool is_in_range = shared.keypoint >= 0 && static_cast<size_t>(shared.keypoint) < num_total &&
                                shared.other >= 0 && shared.other < message.keyframe && shared.other_keypoint >= 0 &&
                                keyframe->shared.size() <= num_total;
-      if (!is_in_range || !FromMessage(shared.position_in_world, &joined.position_in_world)) {
+      if (!is_in_range || !FromMessage(shared.position_in_other, &joined.position_in_other)) {
         return "a shared keypoint is out of range";
       }
     }
@@ -153,6 +153,8 @@ struct Codec<PoseEstimate> {
     message->is_keyframe = pose.is_keyframe ? 1 : 0;
     message->num_deltas = pose.num_deltas;
     message->is_live = pose.is_live ? 1 : 0;
+    message->is_relocalized = pose.is_relocalized ? 1 : 0;
+    message->relocalized_by = pose.relocalized_by.value;
     message->map_wait_us = pose.map_wait_us;
     emit(*message);
   }
@@ -170,6 +172,8 @@ struct Codec<PoseEstimate> {
              .num_inliers = message.num_inliers,
              .num_landmarks = message.num_landmarks,
              .is_keyframe = message.is_keyframe != 0,
+             .is_relocalized = message.is_relocalized != 0,
+             .relocalized_by = {message.relocalized_by},
              .num_deltas = message.num_deltas,
              .is_live = message.is_live != 0,
              .map_wait_us = message.map_wait_us};
@@ -180,6 +184,7 @@ struct Codec<PoseEstimate> {
          FromMessage(message.reference_from_camera, &pose->reference_from_camera),
          Require(message.reference_keyframe >= -1 && message.num_features >= 0 && message.num_matches >= 0 &&
                      message.num_inliers >= 0 && message.num_landmarks >= 0 && message.num_deltas >= 0 &&
+                     message.relocalized_by >= -1 && message.relocalized_by <= message.frame &&
                      message.map_wait_us >= 0,
                  "one of its counts is negative")});
   }

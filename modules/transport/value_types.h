@@ -16,5 +16,9 @@
   X(MapDelta)                          \
   X(MapRequest)                        \
   X(MapSnapshotPage)                   \
+  X(LoopResult)                        \
+  X(GlobalAdjustment)                  \
+  X(RelocalizationRequest)             \
+  X(RelocalizationAnswer)              \
   X(ExtractorReady)                    \
   X(StageStatus)

@@ -1,6 +1,7 @@
 #include "benchmarks/offline_run.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <ctime>
 #include <memory>
 #include <string>
@@ -10,6 +11,7 @@
 #include "features/selection.h"
 #include "features/tiling.h"
 #include "geometry/alignment.h"
+#include "optimization/global_adjustment.h"
 
 namespace tessera {
 namespace {
@@ -77,15 +79,75 @@ std::map<FrameId, Rigid3> OfflineRun::Optimized() const {
   for (const PoseEstimate& pose : poses) {
     if (pose.state != TrackingState::kTracked) continue;
     const auto reference = mapper.removed_keyframes().Find(mapper.map(), pose.reference_keyframe);
-    if (reference) optimized[pose.frame] = *reference * pose.reference_from_camera;
+    if (reference) optimized[pose.frame] = (*reference * pose.reference_from_camera).Pose();
   }
   return optimized;
 }
+
+namespace {
+
+// The mapper with the loop closer and the global adjuster behind it, in logical time.
+class Mapping {
+ public:
+  explicit Mapping(OfflineRun& run) : run_(run), schedule_(run.delays) {}
+
+  std::shared_ptr<const MapDelta> Process(const KeyframeObservation& keyframe) {
+    const DueCorrections due = run_.loop_closer ? schedule_.Take(keyframe.id) : DueCorrections{};
+    const auto delta = Measure(run_.map_ms, [&] {
+      return std::make_shared<const MapDelta>(run_.mapper.Process(keyframe, due));
+    });
+    Follow(*delta);
+    if (run_.loop_closer) {
+      LoopResult result = Measure(run_.loop_ms, [&] { return run_.loop_closer->FindLoop(keyframe.id); });
+      schedule_.Receive(result);
+      if (result.matched.valid()) {
+        std::fprintf(stderr, "keyframe %ld sees keyframe %ld again: %zu points, scale %.4f, shift %.2f\n",
+                     static_cast<long>(result.answers.value), static_cast<long>(result.matched.value),
+                     result.seen.size(), result.matched_from_current.scale,
+                     (result.corrections.back().new_world_from_old *
+                          run_.mapper.map().FindKeyframe(result.corrections.back().id)->world_from_camera.translation -
+                      run_.mapper.map().FindKeyframe(result.corrections.back().id)->world_from_camera.translation)
+                         .norm());
+      }
+      result.corrections.clear();
+      run_.loops.push_back(std::move(result));
+    }
+    return delta;
+  }
+
+  void Finish() {
+    if (!run_.loop_closer || run_.loops.empty()) return;
+    while (auto delta = run_.mapper.Finish(schedule_.TakeAll(run_.loops.back().answers))) Follow(*delta);
+  }
+
+ private:
+  void Follow(const MapDelta& delta) {
+    if (!run_.loop_closer) return;
+    if (const std::string problem = run_.loop_closer->ApplyDelta(delta); !problem.empty()) throw InputError(problem);
+    if (!delta.asks_adjustment) return;
+    schedule_.Ask(delta.answers);
+    schedule_.Receive(Measure(run_.adjust_ms, [&] {
+      BundleOptions o = GlobalBundleOptions();
+      if (const char* e = getenv("GBA_ITER")) o.max_num_iterations = std::atoi(e);
+      if (const char* e = getenv("GBA_ROUNDS")) o.num_rounds = std::atoi(e);
+      if (const char* e = getenv("GBA_TOL")) o.function_tolerance = std::atof(e);
+      GlobalAdjustment a = AdjustGlobally(run_.mapper.map(), delta.answers, o);
+      if (getenv("GBA_OFF")) a.is_usable = false;
+      return a;
+    }));
+  }
+
+  OfflineRun& run_;
+  CorrectionSchedule schedule_;
+};
+
+}  // namespace
 
 void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& tracker_options, int64_t map_delay_frames,
           OfflineRun& run) {
   MapTracker tracker(tracker_options);
   DeltaSchedule schedule(map_delay_frames);
+  Mapping mapping(run);
   bool was_lost = false;
   for (const FeatureFrame& features : frames) {
     const MapTrackingResult result = Measure(run.track_ms, [&] {
@@ -101,10 +163,10 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
     was_lost = is_lost;
     for (const KeyframeObservation& keyframe : result.keyframes) {
       schedule.KeyframeSent(keyframe.id, features.frame);
-      schedule.Receive(
-          std::make_shared<const MapDelta>(Measure(run.map_ms, [&] { return run.mapper.Process(keyframe); })));
+      schedule.Receive(mapping.Process(keyframe));
     }
   }
+  mapping.Finish();
 }
 
 std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,

@@ -8,6 +8,7 @@
 #include "datasets/frame_source.h"
 #include "evaluation/pose_text.h"
 #include "features/feature_types.h"
+#include "stages/loop_closer/loop_closer.h"
 #include "stages/mapper/mapper.h"
 #include "tracking/delta_schedule.h"
 #include "tracking/map_tracker.h"
@@ -30,10 +31,13 @@ struct OfflineRun {
   explicit OfflineRun(const MapperOptions& options) : mapper(options) {}
 
   Mapper mapper;
+  std::unique_ptr<LoopCloser> loop_closer;  // null: no loops are closed
+  CorrectionDelays delays;
+  std::vector<LoopResult> loops;  // by keyframe, without their corrections
   std::vector<PoseEstimate> poses;
   int num_lost = 0;
   int num_failures = 0;  // changes from tracked to lost
-  std::vector<double> track_ms, map_ms;  // CPU time by frame, by keyframe
+  std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
   // Places of tracked frames: as known at the time, and after all optimisation.
   std::map<FrameId, Rigid3> Live() const;

@@ -1,7 +1,7 @@
 // The whole of mapping without the bus: reads a data set, extracts, tracks and maps in one thread, with the deltas
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
-//   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0]
+//   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
 // OUT_DIR gets trajectory.txt (after all optimisation), trajectory_live.txt and ground_truth.txt, TUM rows each.
@@ -24,6 +24,8 @@ struct Arguments {
   FeatureOptions features;
   int64_t map_delay_frames = 3;
   bool is_mirrored = false;
+  std::string vocabulary;
+  MapTrackerOptions tracker;
 };
 
 Arguments ParseArguments(int argc, char** argv) {
@@ -33,11 +35,24 @@ Arguments ParseArguments(int argc, char** argv) {
   for (int i = 4; i < argc; ++i) {
     const std::string text = argv[i], key = text.substr(0, text.find('='));
     if (key == text) throw InputError("`" + text + "` is not key=value");
+    if (key == "vocabulary") {
+      arguments.vocabulary = text.substr(key.size() + 1);
+      continue;
+    }
+    if (key == "share") {
+      arguments.tracker.keyframes.min_share = std::stod(text.substr(key.size() + 1));
+      continue;
+    }
+    if (key == "parallax") {
+      arguments.tracker.keyframes.min_parallax_rad = std::stod(text.substr(key.size() + 1));
+      continue;
+    }
     const int64_t value = std::stoll(text.substr(key.size() + 1));
     if (key == "first") arguments.source.first_frame = value;
     else if (key == "last") arguments.source.last_frame = value;
     else if (key == "delay") arguments.map_delay_frames = value;
     else if (key == "features") arguments.features.num_features = static_cast<int>(value);
+    else if (key == "interval_us") arguments.tracker.keyframes.max_interval_us = value;
     else if (key == "mirror") arguments.is_mirrored = value != 0;
     else throw InputError("unknown argument `" + key + "`");
   }
@@ -66,6 +81,12 @@ void WriteFiles(const FeatureSequence& sequence, const OfflineRun& run, const st
       file << TumRow(frame.utime_us, pose->second);
     }
   }
+  std::ofstream frames_file(out_dir / "frames.csv");
+  frames_file << "frame,features,matches,inliers,is_keyframe\n";
+  for (const PoseEstimate& pose : run.poses) {
+    frames_file << pose.frame.value << ',' << pose.num_features << ',' << pose.num_matches << ',' << pose.num_inliers
+                << ',' << pose.is_keyframe << '\n';
+  }
   for (const GroundTruthPose& pose : sequence.ground_truth) {
     truth_file << TumRow(pose.utime_us, pose.world_from_camera);
   }
@@ -86,6 +107,19 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
   PrintTimes("extraction", sequence.extract_ms, sequence.frames.size());
   PrintTimes("tracker", run.track_ms, sequence.frames.size());
   PrintTimes("mapper", run.map_ms, sequence.frames.size());
+  PrintTimes("loops", run.loop_ms, sequence.frames.size());
+  PrintTimes("adjuster", run.adjust_ms, sequence.frames.size());
+  int num_candidates = 0, num_consistent = 0, num_matched = 0, num_aligned = 0, num_confirmed = 0;
+  for (const LoopResult& loop : run.loops) {
+    num_candidates += loop.num_candidates;
+    num_consistent += loop.num_consistent;
+    num_matched += loop.num_matched;
+    num_aligned += loop.num_aligned;
+    num_confirmed += loop.matched.valid() ? 1 : 0;
+  }
+  std::printf("loop candidates %d, consistent %d, matched %d, aligned %d, confirmed %d, void %ld, closed %zu\n",
+              num_candidates, num_consistent, num_matched, num_aligned, num_confirmed,
+              static_cast<long>(run.mapper.num_void_loops()), map.closed_loops().size());
 }
 
 }  // namespace
@@ -93,7 +127,7 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::cerr << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0]\n";
+    std::cerr << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]\n";
     return 2;
   }
   try {
@@ -101,7 +135,11 @@ int main(int argc, char** argv) {
     const tessera::FeatureSequence sequence =
         tessera::ExtractSequence(arguments.source, arguments.features, arguments.is_mirrored);
     tessera::OfflineRun run(tessera::MapperOptions{});
-    tessera::Play(sequence.frames, tessera::MapTrackerOptions{}, arguments.map_delay_frames, run);
+    if (!arguments.vocabulary.empty()) {
+      run.loop_closer = std::make_unique<tessera::LoopCloser>(tessera::Vocabulary::Load(arguments.vocabulary),
+                                                              tessera::LoopCloserOptions{});
+    }
+    tessera::Play(sequence.frames, arguments.tracker, arguments.map_delay_frames, run);
     tessera::Report(sequence, run);
     tessera::WriteFiles(sequence, run, argv[3]);
   } catch (const std::exception& error) {

@@ -20,9 +20,9 @@ TEST(LandmarkDescription, FollowsFromTheObservations) {
   Map map;
   MapEditor editor(map);
   // Three cameras around a landmark at the origin; the second's descriptor lies between the others'.
-  editor.AddKeyframe({0}, {}, {Eigen::Quaterniond::Identity(), {1, 0, -10}}, OneFeature(0, {0xFF, 0, 0, 0}));
-  editor.AddKeyframe({1}, {0}, {Eigen::Quaterniond::Identity(), {0, 0, -10}}, OneFeature(1, {0x0F, 0, 0, 0}));
-  editor.AddKeyframe({2}, {1}, {Eigen::Quaterniond::Identity(), {-1, 0, -10}}, OneFeature(2, {0x03, 0, 0, 0}));
+  editor.AddKeyframe({0}, {}, {1.0, Eigen::Quaterniond::Identity(), {1, 0, -10}}, OneFeature(0, {0xFF, 0, 0, 0}));
+  editor.AddKeyframe({1}, {0}, {1.0, Eigen::Quaterniond::Identity(), {0, 0, -10}}, OneFeature(1, {0x0F, 0, 0, 0}));
+  editor.AddKeyframe({2}, {1}, {1.0, Eigen::Quaterniond::Identity(), {-1, 0, -10}}, OneFeature(2, {0x03, 0, 0, 0}));
   const LandmarkId id = editor.AddLandmark({});
   for (int64_t keyframe = 0; keyframe < 3; ++keyframe) editor.AddObservation(id, {{keyframe}, 0});
 

@@ -46,7 +46,7 @@ inline MapDelta RandomChange(Map& map, std::mt19937& generator) {
   delta.number = map.next_delta();
   const KeyframeId keyframe{map.keyframes().end_id()};
   delta.answers = keyframe;
-  delta.new_keyframes.push_back({keyframe, {keyframe.value - 1}, {}, RandomFeatures(3 * keyframe.value, generator)});
+  delta.new_keyframes.push_back({keyframe, {keyframe.value - 1}, {}, RandomFeatures(3 * keyframe.value, generator), 2.5});
   const KeyframeId gone{keyframe.value % 5 == 4 ? keyframe.value - 3 : -1};
   int32_t keypoint = 0;
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
@@ -71,7 +71,7 @@ inline MapDelta RandomChange(Map& map, std::mt19937& generator) {
   }
   if (keyframe.value > 0) {
     const auto shift = static_cast<double>(generator() % 100);
-    delta.moved_keyframes.push_back({{keyframe.value - 1}, {Eigen::Quaterniond::Identity(), {shift, 0, 0}}});
+    delta.moved_keyframes.push_back({{keyframe.value - 1}, {Eigen::Quaterniond::Identity(), {shift, 0, 0}}, 1.0 + shift});
   }
   // The hash is found by trying on a copy, whose complaint about the missing hash is expected.
   Map trial = map;

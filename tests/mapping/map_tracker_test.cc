@@ -40,7 +40,7 @@ void Follow(SyntheticWorld world, int64_t num_frames, int64_t delay_frames, cons
 // The final place of a frame, in the world of the first.
 Rigid3 FinalPose(const Outcome& outcome, const PoseEstimate& pose) {
   const auto reference = outcome.mapper.removed_keyframes().Find(outcome.mapper.map(), pose.reference_keyframe);
-  return reference.value_or(Rigid3::Identity()) * pose.reference_from_camera;
+  return (reference.value_or(Sim3{}) * pose.reference_from_camera).Pose();
 }
 
 TEST(MapTracker, FollowsAStereoDrive) {

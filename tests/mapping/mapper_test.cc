@@ -148,7 +148,7 @@ TEST(Mapper, RedundantKeyframesGoAndTheirPlaceIsRemembered) {
   for (int64_t k = 0; k < 15; ++k) {
     const auto pose = mapper.removed_keyframes().Find(mapper.map(), {k});
     ASSERT_TRUE(pose.has_value()) << k;
-    EXPECT_LT(CenterError(*pose, world.Pose(static_cast<double>(k / 8))), 0.02);
+    EXPECT_LT(CenterError(pose->Pose(), world.Pose(static_cast<double>(k / 8))), 0.02);
   }
 }
 

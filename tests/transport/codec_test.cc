@@ -177,7 +177,7 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.reference = keyframe.id; });
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].other = keyframe.id; });
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].keypoint = 1 << 19; });
-  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].position_in_world.x() = kNan; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].position_in_other.x() = kNan; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.number = -1; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.new_keyframes[1].id.value = -1; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.moved_keyframes[0].world_from_camera.translation.x() = kNan; });

@@ -230,7 +230,7 @@ template <>
 bool AreSame(const KeyframeObservation& a, const KeyframeObservation& b) {
   const auto is_same = [](const SharedKeypoint& x, const SharedKeypoint& y) {
     return x.keypoint == y.keypoint && x.other == y.other && x.other_keypoint == y.other_keypoint &&
-           x.position_in_world == y.position_in_world;
+           x.position_in_other == y.position_in_other;
   };
   return a.id == b.id && AreSame(a.features, b.features) && AreSamePose(a.world_from_camera, b.world_from_camera) &&
          a.landmarks == b.landmarks && a.reference == b.reference &&
@@ -253,7 +253,7 @@ MapDelta DrawContent(std::mt19937& generator, int size) {
   MapDelta delta{.number = Draw(generator, 0, 99), .answers = {Draw(generator, -1, 99)}, .hash = generator()};
   for (int i = 0; i < 3 * size; ++i) {
     auto features = std::make_shared<FeatureFrame>(DrawValue<FeatureFrame>(generator, i % 2));
-    delta.new_keyframes.push_back({{i}, {Draw(generator, -1, 9)}, DrawPose(generator), std::move(features)});
+    delta.new_keyframes.push_back({{i}, {Draw(generator, -1, 9)}, DrawPose(generator), std::move(features), DrawReal(generator, 0.1, 9)});
   }
   const int num_landmarks = size * Draw(generator, 1, 2000);
   for (int i = 0; i < num_landmarks; ++i) {
@@ -265,7 +265,7 @@ MapDelta DrawContent(std::mt19937& generator, int size) {
 
 bool AreSameKeyframe(const MapDelta::NewKeyframe& a, const MapDelta::NewKeyframe& b) {
   return a.id == b.id && a.parent == b.parent && AreSamePose(a.world_from_camera, b.world_from_camera) &&
-         AreSame(*a.features, *b.features);
+         a.scale == b.scale && AreSame(*a.features, *b.features);
 }
 
 template <class Item, class IsSame>
@@ -279,10 +279,12 @@ template <>
 MapDelta DrawValue<MapDelta>(std::mt19937& generator, int size) {
   MapDelta delta = DrawContent(generator, size);
   for (int i = 0; i < 20 * size; ++i) {
-    delta.moved_keyframes.push_back({{Draw(generator, 0, 99)}, DrawPose(generator)});
+    delta.moved_keyframes.push_back({{Draw(generator, 0, 99)}, DrawPose(generator), DrawReal(generator, 0.1, 9)});
     delta.changed_parents.push_back({{Draw(generator, 0, 99)}, {Draw(generator, -1, 99)}});
     delta.removed_keyframes.push_back({Draw(generator, 0, 99)});
+    delta.closed_loops.push_back({{Draw(generator, 0, 99)}, {Draw(generator, 0, 99)}, DrawReal(generator, 0.1, 9), 7});
   }
+  delta.asks_adjustment = generator() % 2 == 0;
   for (int i = 0; i < 500 * size; ++i) {
     delta.removed_observations.push_back({{Draw(generator, 0, 99)}, {{Draw(generator, 0, 99)}, Draw(generator, 0, 99)}});
     delta.removed_landmarks.push_back({Draw(generator, 0, 99)});
@@ -292,10 +294,12 @@ MapDelta DrawValue<MapDelta>(std::mt19937& generator, int size) {
 template <>
 bool AreSame(const MapDelta& a, const MapDelta& b) {
   return a.number == b.number && a.answers == b.answers && a.is_snapshot == b.is_snapshot && a.hash == b.hash &&
+         a.asks_adjustment == b.asks_adjustment && a.closed_loops == b.closed_loops &&
          AreSameLists(a.new_keyframes, b.new_keyframes, AreSameKeyframe) &&
          AreSameLists(a.moved_keyframes, b.moved_keyframes,
                       [](const auto& x, const auto& y) {
-                        return x.id == y.id && AreSamePose(x.world_from_camera, y.world_from_camera);
+                        return x.id == y.id && x.scale == y.scale &&
+                               AreSamePose(x.world_from_camera, y.world_from_camera);
                       }) &&
          AreSameLists(a.changed_landmarks, b.changed_landmarks,
                       [](const auto& x, const auto& y) { return x.id == y.id && x.landmark == y.landmark; }) &&

@@ -7,6 +7,7 @@
 #include "core/errors.h"
 #include "evaluation/run_files.h"
 #include "map/tracking_types.h"
+#include "transport/map_file.h"
 #include "transport/stage_messages.h"
 
 namespace tessera {
@@ -23,7 +24,8 @@ StageFigures FiguresOf(const StageStatus& status) {
   return {.step_ms = {step.count, step.mean_ms, step.median_ms, step.p95_ms, step.p99_ms, step.max_ms},
           .num_repaired = status.num_repaired,
           .num_lost = status.num_lost,
-          .num_dropped = status.num_dropped};
+          .num_dropped = status.num_dropped,
+          .values = {status.values.begin(), status.values.end()}};
 }
 
 }  // namespace
@@ -31,7 +33,7 @@ StageFigures FiguresOf(const StageStatus& status) {
 EvaluatorStage::EvaluatorStage(StageContext& context)
     : context_(context),
       out_dir_(context.settings().Get<std::string>("evaluator.out_dir")),
-      map_(context, false, [this] { OnDeltas(); }) {
+      map_(context, !context.settings().Get<std::string>("mapper.load_map").empty(), [this] { OnDeltas(); }) {
   if (!out_dir_.empty()) {
     std::error_code error;
     std::filesystem::create_directories(out_dir_, error);
@@ -138,6 +140,10 @@ void EvaluatorStage::Write() {
   is_written_ = true;  // also when it fails: trying again would fail again
   if (out_dir_.empty()) {
     return;
+  }
+  WriteMapFile(record_.map(), out_dir_ + "/map.tessera");
+  if (const auto path = context_.settings().Get<std::string>("evaluator.save_map"); !path.empty()) {
+    WriteMapFile(record_.map(), path);
   }
   WriteRun(record_, out_dir_);
   context_.Info("wrote the run to " + out_dir_);

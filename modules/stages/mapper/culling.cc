@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
 #include "tracking/landmark_view.h"
 
@@ -90,7 +91,13 @@ void RemoveUnconfirmed(KeyframeId center, const std::vector<LandmarkId>& created
 
 void CullKeyframes(KeyframeId center, const CullingOptions& options, RemovedKeyframes& removed, MapEditor& editor) {
   const Map& map = editor.map();
+  std::set<KeyframeId> kept;
+  for (const ClosedLoop& loop : map.closed_loops()) {
+    kept.insert(loop.current);
+    kept.insert(loop.matched);
+  }
   for (const KeyframeId id : map.Covisible(center, std::numeric_limits<int>::max())) {
+    if (kept.contains(id)) continue;
     const KeyframeId parent = map.FindKeyframe(id)->parent;
     if (!parent.valid() || id.value > center.value - options.kept_newest || !IsRedundant(map, id, options)) continue;
     map.keyframes().ForEach([&](KeyframeId child, const Keyframe& keyframe) {

@@ -43,7 +43,7 @@ void RemoveUnconfirmed(KeyframeId center, const std::vector<LandmarkId>& created
                        MapEditor& editor);
 
 // Removes the redundant ones among the keyframes that share landmarks with `center`; their children pass to their
-// parents, and `removed` remembers where they stood. Roots stay.
+// parents, and `removed` remembers where they stood. Roots stay, and so do keyframes that closed a loop.
 void CullKeyframes(KeyframeId center, const CullingOptions& options, RemovedKeyframes& removed, MapEditor& editor);
 
 }  // namespace tessera

@@ -27,19 +27,6 @@ LandmarkId AddLandmark(const Eigen::Vector3d& position_in_world, std::initialize
   return id;
 }
 
-// Depths (z) of the landmarks that a keyframe sees, rising.
-std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe) {
-  const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
-  std::vector<double> depths;
-  for (const LandmarkId id : keyframe.landmarks) {
-    if (!id.valid()) continue;
-    const double z = (camera_from_world * map.FindLandmark(id)->position_in_world).z();
-    if (z > 0.0) depths.push_back(z);
-  }
-  std::sort(depths.begin(), depths.end());
-  return depths;
-}
-
 // The search for second views of one keyframe's keypoints in another.
 class PairSearch {
  public:

@@ -16,14 +16,6 @@ bool IsSeenBy(const Map& map, LandmarkId landmark, KeyframeId keyframe) {
                      [&](const Observation& observation) { return observation.keyframe == keyframe; });
 }
 
-std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe) {
-  std::vector<LandmarkId> landmarks;
-  for (const LandmarkId id : keyframe.landmarks) {
-    if (id.valid()) landmarks.push_back(id);
-  }
-  return landmarks;
-}
-
 // The keyframe's keypoint that shows the landmark best; -1: none does.
 int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const View& view, const Landmark& landmark,
                      const FusionOptions& options) {
@@ -73,6 +65,19 @@ void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, co
 
 }  // namespace
 
+std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe) {
+  std::vector<LandmarkId> landmarks;
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (id.valid()) landmarks.push_back(id);
+  }
+  return landmarks;
+}
+
+void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<LandmarkId>& landmarks,
+                      const FusionOptions& options, MapEditor& editor) {
+  for (const KeyframeId target : targets) ProjectInto(target, landmarks, options, editor);
+}
+
 std::string FusionOptions::Check() const {
   if (max_neighbours < 1 || max_second_neighbours < 0) return "mapper.fusion_neighbours must be at least 1";
   if (!(radius_px > 0.0) || max_hamming < 1) return "the mapper's search for duplicates needs a positive radius";
@@ -91,9 +96,7 @@ void FuseLandmarks(KeyframeId id, const FusionOptions& options, MapEditor& edito
   targets.erase(id);
 
   const std::vector<LandmarkId> own = SeenLandmarks(*map.FindKeyframe(id));
-  for (const KeyframeId target : targets) {
-    ProjectInto(target, own, options, editor);
-  }
+  ProjectLandmarks(targets, own, options, editor);
   std::set<LandmarkId> theirs;
   for (const KeyframeId target : targets) {
     for (const LandmarkId landmark : SeenLandmarks(*map.FindKeyframe(target))) {

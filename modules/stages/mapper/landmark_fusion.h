@@ -1,7 +1,9 @@
 // Landmarks that are one and the same point, found by projecting them into the keyframes around.
 #pragma once
 
+#include <set>
 #include <string>
+#include <vector>
 
 #include "map/map_editor.h"
 
@@ -21,5 +23,12 @@ struct FusionOptions {
 // projection (chi-square, level, descriptor), the landmark is observed there; if the keypoint sees another landmark
 // already, the two are merged into the one with more observations (ties: the older).
 void FuseLandmarks(KeyframeId keyframe, const FusionOptions& options, MapEditor& editor);
+
+// Projects `landmarks` into each of `targets` in the same way: a place seen again holds its landmarks twice.
+void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<LandmarkId>& landmarks,
+                      const FusionOptions& options, MapEditor& editor);
+
+// The landmarks that the keyframe sees.
+std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe);
 
 }  // namespace tessera

@@ -6,7 +6,7 @@
 
 #include "map/landmark_description.h"
 #include "map/map_editor.h"
-#include "stages/mapper/local_adjustment.h"
+#include "optimization/local_adjustment.h"
 #include "tracking/landmark_view.h"
 
 namespace tessera {
@@ -65,8 +65,9 @@ Mapper::Mapper(const MapperOptions& options) : options_(options) {
   if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
 }
 
-MapDelta Mapper::Process(const KeyframeObservation& seen) {
+MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
+  Bend(due, seen.id, editor);
   Insert(seen, editor);
   ObserveLandmarks(seen, editor);
   ObserveShared(seen, editor);
@@ -78,10 +79,55 @@ MapDelta Mapper::Process(const KeyframeObservation& seen) {
   AdjustLocally(seen.id, options_.window, options_.bundle, editor);
   CullKeyframes(seen.id, options_.culling, removed_, editor);
   RefreshDescriptions(editor);
-  return editor.Finish(seen.id);
+  MapDelta delta = editor.Finish(seen.id);
+  delta.asks_adjustment = AskForAdjustment(seen.id);
+  return delta;
 }
 
-// world_from_camera = world_from_reference (as the map has it now) * reference_from_camera
+std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
+  MapEditor editor(map_);
+  const KeyframeId last = map_.answered();
+  if (!Bend(due, {last.value + 1}, editor) && !wants_adjustment_) return std::nullopt;
+  RefreshDescriptions(editor);
+  MapDelta delta = editor.Finish(last);
+  delta.asks_adjustment = AskForAdjustment(last);
+  return delta;
+}
+
+// Whether anything moved. A loop found on a map that was bent meanwhile is void, and so is an adjustment; a loop comes
+// first, since it changes more.
+bool Mapper::Bend(const DueCorrections& due, KeyframeId now, MapEditor& editor) {
+  bool is_bent = false;
+  for (const LoopResult& loop : due.loops) {
+    const bool is_there = map_.FindKeyframe(loop.answers) != nullptr && map_.FindKeyframe(loop.matched) != nullptr;
+    if (!is_there || loop.answers < last_bent_) {
+      ++num_void_loops_;
+      continue;
+    }
+    CloseLoop(loop, options_.loop_fusion, editor);
+    AdjustLocally(loop.answers, options_.window, options_.bundle, editor);
+    last_bent_ = now;
+    wants_adjustment_ = is_base_bent_ = is_bent = true;
+  }
+  if (due.adjustment) {
+    if (due.adjustment->is_usable && !is_base_bent_) {
+      ApplyAdjustment(*due.adjustment, *base_, editor);
+      last_bent_ = now;
+      is_bent = true;
+    }
+    base_.reset();
+  }
+  return is_bent;
+}
+
+bool Mapper::AskForAdjustment(KeyframeId now) {
+  if (!wants_adjustment_ || base_) return false;
+  base_ = TakeBase(map_, now);
+  wants_adjustment_ = is_base_bent_ = false;
+  return true;
+}
+
+// world_from_keyframe = world_from_reference (as the map has it now) * reference_from_camera
 void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
   const size_t num_keypoints = seen.features.keypoints.size();
   if (!seen.id.valid() || map_.FindKeyframe(seen.id) != nullptr || seen.landmarks.size() != num_keypoints ||
@@ -89,10 +135,10 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
     throw std::invalid_argument("keyframe " + std::to_string(seen.id.value) +
                                 " is not new, or its lists do not fit its keypoints");
   }
-  const std::optional<Rigid3> world_from_reference = removed_.Find(map_, seen.reference);
-  const Rigid3 pose =
-      world_from_reference ? *world_from_reference * seen.reference_from_camera : seen.world_from_camera;
-  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), pose,
+  const std::optional<Sim3> world_from_reference = removed_.Find(map_, seen.reference);
+  const Sim3 world_from_keyframe = world_from_reference ? *world_from_reference * seen.reference_from_camera
+                                                        : Sim3::From(seen.world_from_camera);
+  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe,
                      std::make_shared<const FeatureFrame>(seen.features));
 }
 
@@ -121,7 +167,7 @@ void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
           own.landmarks[static_cast<size_t>(shared.keypoint)].valid()) {
         continue;
       }
-      landmark = editor.AddLandmark({.position_in_world = shared.position_in_world});
+      landmark = editor.AddLandmark({.position_in_world = other->WorldFromKeyframe() * shared.position_in_other});
       editor.AddObservation(landmark, {shared.other, shared.other_keypoint});
       created.push_back(landmark);
     }

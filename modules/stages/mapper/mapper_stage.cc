@@ -1,9 +1,11 @@
 #include "stages/mapper/mapper_stage.h"
 
+#include <algorithm>
 #include <memory>
-#include <string>
+#include <utility>
 
 #include "core/errors.h"
+#include "transport/map_file.h"
 
 namespace tessera {
 namespace {
@@ -28,45 +30,96 @@ MapperOptions OptionsFrom(const Settings& settings) {
   return options;
 }
 
+CorrectionDelays DelaysFrom(const Settings& settings) {
+  const CorrectionDelays delays{settings.Get<int>("mapper.loop_delay_keyframes"),
+                                settings.Get<int>("mapper.adjustment_delay_keyframes")};
+  if (delays.loop_keyframes < 1 || delays.adjustment_keyframes < 1 ||
+      std::max(delays.loop_keyframes, delays.adjustment_keyframes) >= MapArchive::kSnapshotInterval) {
+    throw InputError("mapper.loop_delay_keyframes and mapper.adjustment_delay_keyframes must be between 1 and " +
+                     std::to_string(MapArchive::kSnapshotInterval - 1));
+  }
+  return delays;
+}
+
 }  // namespace
 
-MapperStage::MapperStage(StageContext& context) : context_(context), mapper_(OptionsFrom(context.settings())) {
+MapperStage::MapperStage(StageContext& context)
+    : context_(context),
+      mapper_(OptionsFrom(context.settings())),
+      closes_loops_(context.settings().Get<bool>("mapper.close_loops")),
+      schedule_(DelaysFrom(context.settings())) {
+  if (const auto path = context.settings().Get<std::string>("mapper.load_map"); !path.empty()) Load(path);
   deltas_ = context.Advertise<MapDelta>(kMapDeltaChannel);
   pages_ = context.Advertise<MapSnapshotPage>(kMapSnapshotChannel);
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
   context.Subscribe<KeyframeObservation>(
       kKeyframeChannel, [this](const KeyframeObservation& keyframe, const MessageInfo&) { OnKeyframe(keyframe); });
+  context.Subscribe<LoopResult>(kLoopResultChannel, [this](const LoopResult& result, const MessageInfo&) {
+    schedule_.Receive(result);
+    ProcessWaiting();
+  });
+  context.Subscribe<GlobalAdjustment>(kGlobalAdjustmentChannel,
+                                      [this](const GlobalAdjustment& adjustment, const MessageInfo&) {
+                                        schedule_.Receive(adjustment);
+                                        ProcessWaiting();
+                                      });
   context.Subscribe<MapRequest>(kMapRequestChannel,
                                 [this](const MapRequest& request, const MessageInfo&) { OnRequest(request); });
   context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
     if (end.stage == "tracker") {
       tracker_end_ = end;
-      FinishIfDone();
+      ProcessWaiting();
     }
   });
 }
 
+// The map goes on where it ended: with the next number of keyframes.
+void MapperStage::Load(const std::string& path) {
+  if (const std::string problem = mapper_.Load(ReadMapFile(path)); !problem.empty()) {
+    throw InputError("map file " + path + " is damaged: " + problem);
+  }
+  archive_.Begin(mapper_.map());
+  next_keyframe_ = {mapper_.map().answered().value + 1};
+  schedule_.BeginAt(next_keyframe_);
+}
+
 void MapperStage::OnKeyframe(const KeyframeObservation& keyframe) {
   // Each delta answers one keyframe, and the tracker waits for it: one that is missing can't be passed over.
-  if (const int64_t expected = mapper_.map().next_delta(); keyframe.id.value != expected) {
+  if (keyframe.id != next_keyframe_) {
     const std::string name = "keyframe " + std::to_string(keyframe.id.value);
     const std::string sentence =
-        expected == 0 ? "the tracker keeps no keyframes before " + name + " any more, so the map can't be built again"
-                      : name + " came where " + std::to_string(expected) +
-                            " was expected: one was lost beyond repair, or there are two trackers";
+        num_processed_ == 0 && waiting_.empty()
+            ? "the tracker keeps no keyframes before " + name + " any more, so the map can't be built again"
+            : name + " came where " + std::to_string(next_keyframe_.value) +
+                  " was expected: one was lost beyond repair, or there are two trackers";
     context_.Fail(sentence + "; start the stack again");
     return;
   }
-  std::shared_ptr<const MapDelta> delta;
-  {
+  ++next_keyframe_.value;
+  waiting_.push_back(keyframe);
+  ProcessWaiting();
+}
+
+void MapperStage::ProcessWaiting() {
+  while (!waiting_.empty() && (!closes_loops_ || schedule_.CanProcess(waiting_.front().id))) {
     const StepTimer timer(context_);
-    delta = std::make_shared<const MapDelta>(mapper_.Process(keyframe));
+    const KeyframeObservation& keyframe = waiting_.front();
+    Publish(mapper_.Process(keyframe, closes_loops_ ? schedule_.Take(keyframe.id) : DueCorrections{}));
+    waiting_.pop_front();
+    ++num_processed_;
   }
-  archive_.Add(delta);
-  deltas_.Publish(*delta);
+  context_.SetQueue(static_cast<int64_t>(waiting_.size()));
+  FinishIfDone();
+}
+
+void MapperStage::Publish(MapDelta&& delta) {
+  if (delta.asks_adjustment) schedule_.Ask(delta.answers);
+  const auto shared = std::make_shared<const MapDelta>(std::move(delta));
+  archive_.Add(shared, mapper_.map());
+  deltas_.Publish(*shared);
   context_.SetValue("keyframes", static_cast<double>(mapper_.map().keyframes().size()));
   context_.SetValue("landmarks", static_cast<double>(mapper_.map().landmarks().size()));
-  FinishIfDone();
+  context_.SetValue("loops", static_cast<double>(mapper_.map().closed_loops().size()));
 }
 
 void MapperStage::OnRequest(const MapRequest& request) {
@@ -75,9 +128,15 @@ void MapperStage::OnRequest(const MapRequest& request) {
   if (answer.page) pages_.Publish(*answer.page);
 }
 
+// When the last keyframe is in the map, all loops and adjustments on their way are waited for, and bend it once more.
 void MapperStage::FinishIfDone() {
-  if (context_.finished() || !tracker_end_ || mapper_.map().next_delta() < tracker_end_->num_values) {
-    return;
+  if (context_.finished() || !tracker_end_ || num_processed_ < tracker_end_->num_values) return;
+  const KeyframeId last{next_keyframe_.value - 1};
+  while (closes_loops_ && num_processed_ > 0) {
+    if (!schedule_.CanFinish(last)) return;
+    std::optional<MapDelta> delta = mapper_.Finish(schedule_.TakeAll(last));
+    if (!delta) break;
+    Publish(std::move(*delta));
   }
   end_of_stream_.Publish({.stage = "mapper",
                           .num_frames = tracker_end_->num_frames,

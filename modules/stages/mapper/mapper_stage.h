@@ -1,10 +1,14 @@
-// Wiring of the mapper: keyframes in, changes of the map out; and the map for those who come late.
+// Wiring of the mapper: keyframes, loops and global adjustments in, changes of the map out; and the map for those who
+// come late. Keyframes wait here until what must bend the map before them is there.
 #pragma once
 
+#include <deque>
 #include <optional>
+#include <string>
 
 #include "geometry/camera_frame.h"
 #include "map/map_archive.h"
+#include "stages/mapper/correction_schedule.h"
 #include "stages/mapper/mapper.h"
 #include "transport/stage.h"
 
@@ -16,12 +20,20 @@ class MapperStage {
   explicit MapperStage(StageContext& context);
 
  private:
+  void Load(const std::string& path);
   void OnKeyframe(const KeyframeObservation& keyframe);
   void OnRequest(const MapRequest& request);
+  void ProcessWaiting();
+  void Publish(MapDelta&& delta);
   void FinishIfDone();
 
   StageContext& context_;
   Mapper mapper_;
+  const bool closes_loops_;
+  CorrectionSchedule schedule_;
+  KeyframeId next_keyframe_{0};  // the next to come
+  std::deque<KeyframeObservation> waiting_;
+  int64_t num_processed_ = 0;    // keyframes
   MapArchive archive_;
   Publisher<MapDelta> deltas_;
   Publisher<MapSnapshotPage> pages_;

@@ -1,4 +1,4 @@
-#include "stages/mapper/local_adjustment.h"
+#include "optimization/local_adjustment.h"
 
 #include <algorithm>
 #include <set>
@@ -52,17 +52,6 @@ void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size
       problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
     }
   }
-}
-
-double MedianDepth(const Map& map, const Keyframe& keyframe) {
-  const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
-  std::vector<double> depths;
-  for (const LandmarkId id : keyframe.landmarks) {
-    if (id.valid()) depths.push_back((camera_from_world * map.FindLandmark(id)->position_in_world).z());
-  }
-  const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return std::max(*middle, 1e-3);
 }
 
 // Ties of the double window. Two outer poses are tied once, by the older one's or the younger one's choice.

@@ -1,0 +1,48 @@
+#include "optimization/global_adjustment.h"
+
+#include <cstdio>
+#include <stdexcept>
+
+#include "map/spanning_tree.h"
+#include "optimization/local_adjustment.h"
+
+namespace tessera {
+namespace {
+
+LocalWindow WholePart(const Map& map, KeyframeId root) {
+  LocalWindow window;
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
+    if (RootOf(map, id) == root) window.inner.push_back(id);
+  });
+  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
+    const std::vector<Observation>& observations = map.ObservationsOf(id);
+    if (observations.size() >= 2 && RootOf(map, observations.front().keyframe) == root) window.landmarks.push_back(id);
+  });
+  return window;
+}
+
+}  // namespace
+
+BundleOptions GlobalBundleOptions() { return {.max_num_iterations = 15, .num_rounds = 2, .max_num_dense_poses = 60}; }
+
+GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOptions& options) {
+  if (map.FindKeyframe(asked) == nullptr) throw std::invalid_argument("the keyframe to be adjusted is not in the map");
+  GlobalAdjustment adjustment;
+  adjustment.answers = asked;
+  const LocalWindow part = WholePart(map, RootOf(map, asked));
+  if (part.inner.size() < 2 || part.landmarks.empty()) return adjustment;
+  const BundleProblem problem = BuildLocalProblem(map, part, {});
+  const std::optional<BundleResult> result = AdjustBundle(problem, options);
+  if (result) std::fprintf(stderr, "GBA %zu poses %zu points %zu obs cost %g -> %g, %d iterations, inliers %d\n", problem.poses.size(), problem.points.size(), problem.observations.size(), result->initial_cost, result->final_cost, result->num_iterations, result->num_inliers);
+  if (!result || !(result->final_cost < result->initial_cost)) return adjustment;
+  adjustment.is_usable = true;
+  for (size_t i = 0; i < problem.poses.size(); ++i) {
+    adjustment.poses.push_back({problem.poses[i].id, result->camera_from_world[i].Inverse()});
+  }
+  for (size_t i = 0; i < problem.points.size(); ++i) {
+    adjustment.points.push_back({problem.points[i].id, result->positions_in_world[i]});
+  }
+  return adjustment;
+}
+
+}  // namespace tessera

@@ -1,0 +1,50 @@
+#include "stages/global_adjuster/global_adjuster_stage.h"
+
+#include <string>
+
+#include "core/errors.h"
+#include "optimization/global_adjustment.h"
+
+namespace tessera {
+namespace {
+
+BundleOptions OptionsFrom(const Settings& settings) {
+  BundleOptions options = GlobalBundleOptions();
+  options.max_num_iterations = settings.Get<int>("global_adjuster.iterations");
+  if (const std::string problem = options.Check(); !problem.empty()) throw InputError("global_adjuster: " + problem);
+  return options;
+}
+
+}  // namespace
+
+GlobalAdjusterStage::GlobalAdjusterStage(StageContext& context)
+    : context_(context), options_(OptionsFrom(context.settings())), map_(context, true, [this] { OnDeltas(); }) {
+  adjustments_ = context.Advertise<GlobalAdjustment>(kGlobalAdjustmentChannel);
+  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
+    if (end.stage != "mapper") return;
+    mapper_end_ = end;
+    map_.Expect(end.num_values);
+    FinishIfDone();
+  });
+}
+
+void GlobalAdjusterStage::OnDeltas() {
+  for (const auto& delta : map_.Take()) {
+    if (const std::string problem = replica_.Apply(*delta); !problem.empty()) {
+      map_.Reject(problem);
+      return;
+    }
+    if (!delta->asks_adjustment) continue;
+    const StepTimer timer(context_);
+    adjustments_.Publish(AdjustGlobally(replica_, delta->answers, options_));
+    context_.SetValue("adjusted", static_cast<double>(++num_adjusted_));
+  }
+  FinishIfDone();
+}
+
+void GlobalAdjusterStage::FinishIfDone() {
+  if (context_.finished() || !mapper_end_ || replica_.next_delta() < mapper_end_->num_values) return;
+  context_.Finish();
+}
+
+}  // namespace tessera

@@ -1,0 +1,153 @@
+#include "stages/loop_closer/place_verification.h"
+
+#include <map>
+#include <memory>
+#include <set>
+
+#include "stages/loop_closer/place_candidates.h"
+
+namespace tessera {
+namespace {
+
+size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
+
+// A landmark of the current keyframe and one of the matched, taken for the same point.
+struct LandmarkPair {
+  int32_t matched_keypoint = -1;
+  int32_t current_keypoint = -1;
+};
+
+PointPair MakePair(const Map& map, const Keyframe& matched, const Keyframe& current, const LandmarkPair& pair) {
+  const auto seen = [&](const Keyframe& keyframe, int32_t keypoint, Eigen::Vector3d* point, PixelObservation* pixel) {
+    const Landmark& landmark = *map.FindLandmark(keyframe.landmarks[Index(keypoint)]);
+    *point = keyframe.world_from_camera.Inverse() * landmark.position_in_world;
+    *pixel = SeenAt(*keyframe.features, keypoint);
+  };
+  PointPair points;
+  seen(matched, pair.matched_keypoint, &points.point_in_first, &points.seen_first);
+  seen(current, pair.current_keypoint, &points.point_in_second, &points.seen_second);
+  return points;
+}
+
+std::vector<LandmarkPair> MatchLandmarks(const PlaceDatabase& places, KeyframeId matched_id, const Keyframe& matched,
+                                         KeyframeId current_id, const Keyframe& current,
+                                         const BagMatchingOptions& options) {
+  const BagOfWords* matched_bag = places.Find(matched_id);
+  const BagOfWords* current_bag = places.Find(current_id);
+  if (matched_bag == nullptr || current_bag == nullptr) return {};
+  const auto sees = [](const Keyframe& keyframe) {
+    return [&keyframe](int32_t keypoint) { return keyframe.landmarks[Index(keypoint)].valid(); };
+  };
+  std::vector<LandmarkPair> pairs;
+  for (const KeypointPair& pair : MatchByBags(*matched.features, *matched_bag, sees(matched), *current.features,
+                                              *current_bag, sees(current), options)) {
+    pairs.push_back({pair.first, pair.second});
+  }
+  return pairs;
+}
+
+// What the current keyframe sees of the place and knows under another name, as far as the matched keyframe sees it too.
+std::vector<PointPair> PairsOf(const Map& map, const TrackedFrame& frame, const Keyframe& matched,
+                               const Keyframe& current) {
+  std::map<LandmarkId, int32_t> keypoint_of;
+  for (size_t i = 0; i < matched.landmarks.size(); ++i) {
+    if (matched.landmarks[i].valid()) keypoint_of[matched.landmarks[i]] = static_cast<int32_t>(i);
+  }
+  std::vector<PointPair> pairs;
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (!frame.points[i].valid() || !current.landmarks[i].valid()) continue;
+    const auto found = keypoint_of.find(frame.points[i].id.landmark);
+    if (found == keypoint_of.end()) continue;
+    pairs.push_back(MakePair(map, matched, current, {found->second, static_cast<int32_t>(i)}));
+  }
+  return pairs;
+}
+
+SimilarityOptions SimilarityFor(const CameraCalibration& camera, SimilarityOptions options) {
+  options.has_scale = camera.sensor == SensorType::kMono;
+  options.baseline_m = options.has_scale ? 0.0 : Baseline(camera);
+  return options;
+}
+
+}  // namespace
+
+std::string VerificationOptions::Check() const {
+  if (min_matches < 3 || min_seen < 6 || num_neighbours < 1) {
+    return "the loop closer must ask for at least 3 matches and 6 landmarks seen";
+  }
+  for (const std::string& sentence : {similarity.Check(), guided.Check()}) {
+    if (!sentence.empty()) return sentence;
+  }
+  return "";
+}
+
+PlacedPoints LandmarksAround(const Map& map, KeyframeId id, int num_neighbours) {
+  std::set<LandmarkId> landmarks;
+  for (const KeyframeId member : PlaceAround(map, id, num_neighbours)) {
+    for (const LandmarkId landmark : map.FindKeyframe(member)->landmarks) {
+      if (landmark.valid()) landmarks.insert(landmark);
+    }
+  }
+  PlacedPoints points;
+  for (const LandmarkId landmark : landmarks) points.emplace_back(PointId{landmark, {}, -1}, *map.FindLandmark(landmark));
+  return points;
+}
+
+int PlaceAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
+               TrackedFrame& frame) {
+  frame.points.assign(frame.points.size(), {});
+  MatchLocal(points, matching.local_radius_px, matching, frame);
+  std::vector<PoseObservation> observations;
+  std::vector<size_t> keypoints;
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (!frame.points[i].valid()) continue;
+    observations.push_back({.point_in_world = frame.points[i].landmark.position_in_world,
+                            .seen = frame.view->observation(static_cast<int>(i))});
+    keypoints.push_back(i);
+  }
+  const PoseOptimizationResult result = OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
+                                                     frame.world_from_camera.Inverse(), pose);
+  frame.world_from_camera = result.camera_from_world.Inverse();
+  for (size_t k = 0; k < keypoints.size(); ++k) {
+    if (!result.is_inlier[k]) frame.points[keypoints[k]] = {};
+  }
+  return result.num_inliers;
+}
+
+std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& places, KeyframeId current_id,
+                                         KeyframeId candidate, const VerificationOptions& options,
+                                         VerificationSteps* steps) {
+  const Keyframe& current = *map.FindKeyframe(current_id);
+  const Keyframe& matched = *map.FindKeyframe(candidate);
+  const CameraCalibration& camera = current.features->calibration;
+  const SimilarityOptions similarity = SimilarityFor(camera, options.similarity);
+  const std::vector<LandmarkPair> matches =
+      MatchLandmarks(places, candidate, matched, current_id, current, options.matching);
+  steps->is_matched = static_cast<int>(matches.size()) >= options.min_matches;
+  if (!steps->is_matched) return std::nullopt;
+
+  std::vector<PointPair> pairs;
+  for (const LandmarkPair& match : matches) pairs.push_back(MakePair(map, matched, current, match));
+  const auto seed = static_cast<uint64_t>(current.features->frame.value);
+  const std::optional<SimilarityEstimate> aligned = EstimateSimilarity(camera, pairs, seed, similarity);
+  steps->is_aligned = aligned.has_value();
+  if (!aligned) return std::nullopt;
+
+  TrackedFrame frame(std::make_shared<const FrameView>(*current.features, options.sigma_px, kRgbdBaseline));
+  const PlacedPoints landmarks = LandmarksAround(map, candidate, options.num_neighbours);
+  frame.world_from_camera = (Sim3::From(matched.world_from_camera) * aligned->first_from_second).Pose();
+  if (PlaceAmong(landmarks, options.guided, {}, frame) < options.min_seen) return std::nullopt;
+  const SimilarityEstimate refined = RefineSimilarity(camera, PairsOf(map, frame, matched, current),
+                                                      aligned->first_from_second, similarity);
+  if (refined.num_inliers < similarity.min_inliers) return std::nullopt;
+
+  VerifiedPlace place{candidate, {}, {}};
+  place.matched_from_current = Sim3::From(matched.world_from_camera.Inverse() * frame.world_from_camera,
+                                          refined.first_from_second.scale);
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (frame.points[i].valid()) place.seen.push_back({static_cast<int32_t>(i), frame.points[i].id.landmark});
+  }
+  return place;
+}
+
+}  // namespace tessera

@@ -1,0 +1,60 @@
+// When the mapper applies what the loop closer and the global adjuster found. The law of logical time: before keyframe k
+// it applies exactly the loop results of keyframes <= k - E; an adjustment that keyframe a asked for, before keyframe
+// a + G. What comes early is held back, what is missing is waited for.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "map/loop_types.h"
+
+namespace tessera {
+
+// What is due at one moment, in the order of the keyframes that it answers.
+struct DueCorrections {
+  std::vector<LoopResult> loops;  // those that found one
+  std::optional<GlobalAdjustment> adjustment;
+};
+
+struct CorrectionDelays {
+  int64_t loop_keyframes = 6;        // E
+  int64_t adjustment_keyframes = 40; // G
+};
+
+class CorrectionSchedule {
+ public:
+  explicit CorrectionSchedule(const CorrectionDelays& delays) : delays_(delays) {}
+
+  // The next keyframe that will get a loop result; those before, in a map that was loaded, have none.
+  void BeginAt(KeyframeId first) { next_loop_ = first; }
+  // In any order; what came before, or is too old, changes nothing.
+  void Receive(const LoopResult& result);
+  void Receive(const GlobalAdjustment& adjustment);
+  // The map after the delta that answers `asked` is being adjusted; one adjustment at a time.
+  void Ask(KeyframeId asked) { asked_ = asked; }
+
+  // Whether all is there that must be applied before keyframe `id`.
+  bool CanProcess(KeyframeId id) const;
+  // Takes it out. CanProcess(id) must hold.
+  DueCorrections Take(KeyframeId id);
+
+  // The same at the end, when `last` was the last keyframe: everything that was asked for is due.
+  bool CanFinish(KeyframeId last) const;
+  DueCorrections TakeAll(KeyframeId last);
+  // Whether an adjustment is still on its way.
+  bool is_asked() const { return asked_.has_value(); }
+
+ private:
+  bool HasLoopsUpTo(KeyframeId id) const;
+  bool IsAdjustmentDue(KeyframeId id) const;
+  DueCorrections TakeUpTo(KeyframeId last_loop, bool takes_adjustment);
+
+  CorrectionDelays delays_;
+  KeyframeId next_loop_{0};
+  std::map<KeyframeId, LoopResult> loops_;
+  std::optional<KeyframeId> asked_;
+  std::map<KeyframeId, GlobalAdjustment> adjustments_;
+};
+
+}  // namespace tessera

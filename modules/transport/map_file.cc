@@ -1,0 +1,102 @@
+#include "transport/map_file.h"
+
+#include <utility>
+
+#include "core/errors.h"
+#include "map/map_exchange.h"
+#include "tessera/map_file_t.hpp"
+#include "transport/channels.h"
+#include "transport/codec.h"
+#include "transport/codec_impl.h"
+#include "transport/codec_parts.h"
+#include "transport/log_file.h"
+
+namespace tessera {
+namespace {
+
+constexpr const char* kHeaderChannel = "MAP_FILE";
+constexpr const char* kPublisher = "map_file";
+constexpr size_t kMaxMessageBytes = 60000;
+
+CameraCalibration CameraOf(const Map& map) {
+  CameraCalibration camera;
+  bool is_first = true;
+  map.keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
+    if (is_first) camera = keyframe.features->calibration;
+    is_first = false;
+  });
+  return camera;
+}
+
+Bytes HeaderMessage(const Map& map, int32_t num_pages) {
+  map_file_t message{};
+  SetHeader({.publisher = kPublisher}, &message.header);
+  message.version = map_file_t::VERSION;
+  message.num_pages = num_pages;
+  message.num_keyframes = map.keyframes().size();
+  message.num_landmarks = map.landmarks().size();
+  message.camera = ToMessage(CameraOf(map));
+  return EncodeMessage(message);
+}
+
+[[noreturn]] void Refuse(const std::string& path, const std::string& problem) {
+  throw InputError("map file " + path + " " + problem);
+}
+
+map_file_t ReadHeaderMessage(LogFileReader& file, const std::string& path) {
+  LogEvent event;
+  if (!file.Next(&event) || event.channel != kHeaderChannel) Refuse(path, "is no map: it does not begin like one");
+  map_file_t header;
+  const WireType* type = WireType::Of(event.data);
+  if (type == nullptr || type != &WireType::Named("map_file_t") || !DecodeMessage(event.data, &header) ||
+      header.version != map_file_t::VERSION) {
+    Refuse(path, "was written by another version of Tessera: make the map again with this one");
+  }
+  if (header.num_pages < 1) Refuse(path, "is damaged: it has no pages");
+  return header;
+}
+
+}  // namespace
+
+void WriteMapFile(const Map& map, const std::string& path) {
+  const MapDelta snapshot = map.Snapshot();
+  const int32_t num_pages = NumSnapshotPages(snapshot);
+  LogFileWriter file(path);
+  file.Write(0, kHeaderChannel, HeaderMessage(map, num_pages));
+  int64_t sequence = 0;
+  for (int32_t page = 0; page < num_pages; ++page) {
+    const MessageHeader header{.publisher = kPublisher, .sequence = sequence};
+    for (const Bytes& message : EncodeValue(CutSnapshotPage(snapshot, page), header, kMaxMessageBytes)) {
+      file.Write(sequence++, kMapSnapshotChannel.name, message);
+    }
+  }
+  file.Close();
+}
+
+MapDelta ReadMapFile(const std::string& path) {
+  LogFileReader file(path);
+  const map_file_t header = ReadHeaderMessage(file, path);
+  ValueJoiner<MapSnapshotPage> joiner;
+  MapDelta snapshot;
+  int32_t num_pages = 0;
+  for (LogEvent event; file.Next(&event);) {
+    const auto message_header = ReadHeader(event.data);
+    using Result = ValueJoiner<MapSnapshotPage>::Result;
+    const Result result = message_header ? joiner.Add(event.data, *message_header) : Result::kRefused;
+    if (result == Result::kRefused) Refuse(path, "is damaged: " + joiner.problem());
+    if (result == Result::kIncomplete) continue;
+    const MapSnapshotPage& page = joiner.value();
+    if (page.page != num_pages || page.num_pages != header.num_pages) Refuse(path, "is damaged: its pages do not fit");
+    if (num_pages++ == 0) {
+      snapshot = page.part;
+    } else {
+      AppendPage(page, &snapshot);
+    }
+  }
+  if (num_pages != header.num_pages) Refuse(path, "is cut off: copy it again, or make the map again");
+  Map trial;
+  if (const std::string problem = trial.Apply(snapshot); !problem.empty()) Refuse(path, "is damaged: " + problem);
+  return snapshot;
+}
+
+}  // namespace tessera
