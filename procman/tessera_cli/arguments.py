@@ -129,12 +129,16 @@ def add_run_commands(commands) -> None:
 
 def add_look_commands(commands) -> None:
     evaluate = add_command(
-        commands, "evaluate", "evaluate", "Error of a trajectory against ground truth, by the evo package.",
+        commands, "evaluate", "evaluate", "Error of runs or trajectory files against ground truth, by the evo package.",
         "Files hold TUM rows `timestamp tx ty tz qx qy qz qw` or KITTI rows of 12 numbers.\n\nexamples:\n"
         "  procman/tessera evaluate logs/mh01\n"
-        "  procman/tessera evaluate trajectory_kitti.txt data/kitti/poses/03.txt --align sim3\n")
-    evaluate.add_argument("estimate", metavar="RUN|TRAJECTORY", help="a run's folder, or a trajectory file")
-    evaluate.add_argument("truth", metavar="GROUND_TRUTH", nargs="?", help="default: the run's own ground_truth.txt")
+        "  procman/tessera evaluate trajectory_kitti.txt data/kitti/poses/03.txt --align sim3 --report both.html\n"
+        "  procman/tessera evaluate logs/one logs/another --report beside.html\n")
+    evaluate.usage = "procman/tessera evaluate RUN|TRAJECTORY ... [GROUND_TRUTH] [options]"
+    evaluate.add_argument("paths", metavar="RUN|TRAJECTORY ... [GROUND_TRUTH]", nargs="+",
+                          help="runs' folders or trajectory files, one or several; a file behind them is the truth of them all, "
+                          "by default each run's own ground_truth.txt")
+    evaluate.add_argument("--report", metavar="FILE.html", help="a report for people too, with all of them beside each other")
     evaluate.add_argument("--align", choices=("sim3", "se3"),
                           help="default: se3 for a stereo or RGB-D run, sim3 (with scale) otherwise")
     keep_map = add_command(

@@ -23,8 +23,8 @@ STALL_TIMEOUT_S = 60.0
 DRAIN_TIMEOUT_S = 3.0
 LISTEN_MS = 50
 # What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
-RUN_FILES = ("summary.json", "run.json", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
-             "keyframes.txt", "map.ply", "ground_truth.txt", "frames.csv", "run.lcmlog", "settings.yaml")
+RUN_FILES = ("summary.json", "run.json", "report.html", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
+             "keyframes.txt", "map.ply", "ground_truth.txt", "frames.csv", "loops.csv", "run.lcmlog", "settings.yaml")
 
 
 def main(arguments: Namespace) -> int:
