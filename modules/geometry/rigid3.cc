@@ -29,6 +29,16 @@ Rigid3 Retract(const Rigid3& a_from_b, const Eigen::Matrix<double, 6, 1>& delta)
   return Rigid3{ExpSO3(delta.tail<3>()), delta.head<3>()} * a_from_b;
 }
 
+Sim3 Retract(const Sim3& a_from_b, const Eigen::Matrix<double, 7, 1>& delta) {
+  return Sim3{std::exp(delta(6)), ExpSO3(delta.segment<3>(3)), delta.head<3>()} * a_from_b;
+}
+
+Eigen::Matrix<double, 7, 1> TangentOf(const Sim3& a_from_b) {
+  Eigen::Matrix<double, 7, 1> tangent;
+  tangent << a_from_b.translation, LogSO3(a_from_b.rotation), std::log(a_from_b.scale);
+  return tangent;
+}
+
 Rigid3 Interpolate(const Rigid3& from, const Rigid3& to, double fraction) {
   return {from.rotation.slerp(fraction, to.rotation).normalized(),
           (1.0 - fraction) * from.translation + fraction * to.translation};

@@ -70,6 +70,13 @@ Eigen::Vector3d LogSO3(const Eigen::Quaterniond& rotation);
 // (first-order equal to the exponential map, cheaper, and as good for optimisation).
 Rigid3 Retract(const Rigid3& a_from_b, const Eigen::Matrix<double, 6, 1>& delta);
 
+// Of Sim(3): (translation, rotation [rad], logarithm of scale) stacked, applied from the left:
+//   Retract(a_from_b, delta) = Sim3{exp(delta(6)), ExpSO3(delta.segment<3>(3)), delta.head<3>()} * a_from_b
+// delta(6) = 0 keeps the scale to the bit.
+Sim3 Retract(const Sim3& a_from_b, const Eigen::Matrix<double, 7, 1>& delta);
+// The tangent with Retract(Sim3{}, tangent) = a_from_b.
+Eigen::Matrix<double, 7, 1> TangentOf(const Sim3& a_from_b);
+
 // Pose a fraction of the way from `from` (0) to `to` (1): linear in translation, slerp in rotation.
 Rigid3 Interpolate(const Rigid3& from, const Rigid3& to, double fraction);
 

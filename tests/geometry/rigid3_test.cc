@@ -64,6 +64,21 @@ TEST(Retract, ZeroChangesNothingAndSmallStepsAdd) {
   EXPECT_LT(Distance(Retract(Retract(a, step), step), Retract(a, 2.0 * step)), 1e-11);
 }
 
+TEST(RetractSim3, TangentOfInvertsItAndZeroKeepsTheScaleToTheBit) {
+  std::mt19937_64 generator(5);
+  for (int i = 0; i < 50; ++i) {
+    Eigen::Matrix<double, 7, 1> tangent;
+    tangent.head<3>() = RandomVector(generator, 10.0);
+    tangent.segment<3>(3) = RandomVector(generator, 1.5);
+    tangent(6) = 0.1 * (i - 25);
+    EXPECT_LT((TangentOf(Retract(Sim3{}, tangent)) - tangent).norm(), 1e-12);
+    const Sim3 moved{0.1 + 0.37 * i, ExpSO3(RandomVector(generator, 1.5)), RandomVector(generator, 10.0)};
+    EXPECT_LT((TangentOf(Retract(moved, tangent) * moved.Inverse()) - tangent).norm(), 1e-11);
+    tangent(6) = 0.0;
+    EXPECT_EQ(Retract(moved, tangent).scale, moved.scale);
+  }
+}
+
 TEST(Interpolate, MeetsBothEndsAndHalfWay) {
   const Rigid3 from = Rigid3::Identity();
   const Rigid3 to{ExpSO3({0.0, 0.4, 0.0}), {2.0, 0.0, 0.0}};

@@ -1,0 +1,64 @@
+// Spreads the error of loops over the keyframes between: what is optimised are relative poses, not landmarks.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/ids.h"
+#include "geometry/rigid3.h"
+
+namespace tessera {
+
+struct PoseGraphNode {
+  KeyframeId id;             // for the caller; the solver goes by index
+  Sim3 world_from_keyframe;  // scale: units of the world for one unit of the keyframe's surroundings
+  bool is_fixed = false;     // held where it is: the gauge
+};
+
+// What is known of two keyframes' relative pose: point_in_to = to_from_from * point_in_from.
+struct PoseGraphEdge {
+  int from = -1;  // indices into PoseGraphProblem::nodes
+  int to = -1;
+  Sim3 to_from_from;
+  double weight = 1.0;  // of the squared residual; two edges alike are one of weight 2
+  // What translations are measured by, in the units of to_from_from's side `from`: the median depth of what the keyframe
+  // sees, or, without landmarks at hand, the distance of the two. It makes the result independent of the map's unit.
+  double length = 1.0;
+};
+
+struct PoseGraphProblem {
+  std::vector<PoseGraphNode> nodes;
+  std::vector<PoseGraphEdge> edges;
+  bool has_scale = true;  // mono: Sim(3); false: SE(3), all scales stay as given, to the bit
+
+  // Empty if well formed, else one sentence: indices in range, a fixed node, positive weights, lengths and scales.
+  std::string Check() const;
+};
+
+struct PoseGraphOptions {
+  int max_num_iterations = 20;       // Levenberg-Marquardt steps; loops of 3000 keyframes take 5 to 10
+  double function_tolerance = 1e-5;  // ends when a step lowers the cost by less than this part of it
+  // Standard deviations of what odometry gets wrong between two keyframes; only their ratios matter (README.md).
+  double translation_sigma = 0.01;   // as a part of PoseGraphEdge::length
+  double rotation_sigma_rad = 0.001;
+  double log_scale_sigma = 0.01;
+
+  // Empty if all is well, else one sentence that says what is out of range.
+  std::string Check() const;
+};
+
+// Minimises over the free S = world_from_keyframe, in Ceres (sparse Cholesky),
+//
+//   1/2 sum_edges weight * |r|^2,   r = (t / (length translation_sigma), log(R) / rotation_sigma_rad, ln(s) / log_scale_sigma)
+//   (s, R, t) = to_from_from^-1 * (S_to^-1 * S_from)                        what is measured^-1 * what is predicted
+//
+// after H. Strasdat, J. M. M. Montiel, A. Davison, "Scale Drift-Aware Large Scale Monocular SLAM", RSS 2010; (t, log R,
+// ln s) equals the logarithm of Sim(3) that is used there to first order. Without scale r has six rows.
+//
+// Returns world_from_keyframe by node; fixed nodes, and those that no chain of edges ties to a fixed one, to the bit as
+// given. A pure function of the values given. Throws std::invalid_argument with Check()'s sentence where problem or options
+// are malformed. nullopt where nothing is free, a value is not finite, or the solver found no step.
+std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& problem, const PoseGraphOptions& options);
+
+}  // namespace tessera

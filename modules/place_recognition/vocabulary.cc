@@ -1,0 +1,111 @@
+#include "place_recognition/vocabulary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+namespace tessera {
+namespace {
+
+// Words in ascending order with how often they occur.
+std::vector<std::pair<int32_t, int32_t>> CountWords(std::vector<int32_t> words) {
+  std::sort(words.begin(), words.end());
+  std::vector<std::pair<int32_t, int32_t>> counts;
+  for (const int32_t word : words) {
+    if (counts.empty() || counts.back().first != word) counts.emplace_back(word, 0);
+    ++counts.back().second;
+  }
+  return counts;
+}
+
+std::vector<std::pair<int32_t, float>> WeighWords(const std::vector<std::pair<int32_t, int32_t>>& counts,
+                                                  const std::vector<float>& idf) {
+  const auto weight_of = [&](const std::pair<int32_t, int32_t>& count) {
+    return static_cast<double>(count.second) * static_cast<double>(idf[static_cast<size_t>(count.first)]);
+  };
+  double sum = 0.0;
+  for (const auto& count : counts) sum += weight_of(count);
+  std::vector<std::pair<int32_t, float>> words;
+  for (const auto& count : counts) {
+    const double weight = weight_of(count);
+    if (weight > 0.0) words.emplace_back(count.first, static_cast<float>(weight / sum));
+  }
+  return words;
+}
+
+}  // namespace
+
+std::string VocabularyTree::Check() const {
+  if (num_children.empty() || num_children.size() != centers.size()) return "it has not one centre for each node";
+  int64_t num_reached = 1;  // the root
+  size_t num_words = 0;
+  for (size_t node = 0; node < num_children.size(); ++node) {
+    if (num_reached <= static_cast<int64_t>(node)) return "its nodes don't make up one tree";
+    num_reached += num_children[node];
+    num_words += num_children[node] == 0 ? 1 : 0;
+  }
+  if (num_reached != static_cast<int64_t>(num_children.size())) return "its nodes don't make up one tree";
+  if (num_words != idf.size()) return "it has not one weight for each word";
+  const bool are_weights_good =
+      std::all_of(idf.begin(), idf.end(), [](float weight) { return std::isfinite(weight) && weight >= 0.0F; });
+  if (!are_weights_good) return "a weight is negative or no number";
+  if (direct_level < 0) return "the level of its direct index is negative";
+  return "";
+}
+
+Vocabulary::Vocabulary(VocabularyTree tree) : tree_(std::move(tree)) {
+  if (const std::string problem = tree_.Check(); !problem.empty()) throw std::invalid_argument(problem);
+  int32_t next_child = 1;
+  int32_t next_word = 0;
+  first_child_.reserve(tree_.num_children.size());
+  for (const uint8_t num_children : tree_.num_children) {
+    first_child_.push_back(num_children > 0 ? next_child : next_word++);
+    next_child += num_children;
+  }
+}
+
+size_t Vocabulary::NearestChild(size_t node, const Descriptor& descriptor) const {
+  const auto first = static_cast<size_t>(first_child_[node]);
+  size_t nearest = first;
+  int least_distance = 257;
+  for (size_t child = first; child < first + tree_.num_children[node]; ++child) {
+    const int distance = HammingDistance(descriptor, tree_.centers[child]);
+    if (distance < least_distance) {
+      least_distance = distance;
+      nearest = child;
+    }
+  }
+  return nearest;
+}
+
+Vocabulary::Leaf Vocabulary::FindLeaf(const Descriptor& descriptor) const {
+  size_t node = 0;
+  size_t direct_node = 0;
+  for (int32_t level = 1; tree_.num_children[node] > 0; ++level) {
+    node = NearestChild(node, descriptor);
+    if (level <= tree_.direct_level) direct_node = node;
+  }
+  return {first_child_[node], static_cast<int32_t>(direct_node)};
+}
+
+BagOfWords Vocabulary::Describe(const std::vector<Descriptor>& descriptors) const {
+  std::vector<int32_t> words(descriptors.size());
+  std::vector<std::pair<int32_t, int32_t>> placed(descriptors.size());  // (node, keypoint)
+  for (size_t i = 0; i < descriptors.size(); ++i) {
+    const Leaf leaf = FindLeaf(descriptors[i]);
+    words[i] = leaf.word;
+    placed[i] = {leaf.direct_node, static_cast<int32_t>(i)};
+  }
+  BagOfWords bag;
+  bag.words = WeighWords(CountWords(std::move(words)), tree_.idf);
+  std::sort(placed.begin(), placed.end());
+  for (const auto& [node, keypoint] : placed) {
+    if (bag.nodes.empty() || bag.nodes.back().first != node) bag.nodes.emplace_back(node, std::vector<int32_t>());
+    bag.nodes.back().second.push_back(keypoint);
+  }
+  return bag;
+}
+
+}  // namespace tessera

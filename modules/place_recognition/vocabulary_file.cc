@@ -1,0 +1,159 @@
+// Vocabularies on disk. All numbers least significant byte first:
+//
+//   "tessera vocabulary\n", version (4), num_nodes (4), num_words (4), direct_level (4), length of the origin (4), origin,
+//   number of children of each node (1), centre of each node (4 x 8), weight of each word (float, 4),
+//   SHA-256 of all that in 64 hexadecimal digits.
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <utility>
+
+#include "core/errors.h"
+#include "core/sha256.h"
+#include "place_recognition/vocabulary.h"
+
+namespace tessera {
+namespace {
+
+constexpr std::string_view kMagic = "tessera vocabulary\n";
+constexpr uint32_t kVersion = 1;
+constexpr size_t kHeaderBytes = kMagic.size() + 5 * sizeof(uint32_t);
+constexpr size_t kDigestBytes = 64;
+
+static_assert(std::endian::native == std::endian::little, "numbers go to the file as they stand in memory");
+
+class Writer {
+ public:
+  void Add(const void* bytes, size_t num_bytes) { text_.append(static_cast<const char*>(bytes), num_bytes); }
+  void AddNumber(size_t number) {
+    const auto value = static_cast<uint32_t>(number);
+    Add(&value, sizeof(value));
+  }
+  template <class Value>
+  void AddAll(const std::vector<Value>& values) {
+    Add(values.data(), values.size() * sizeof(Value));
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+// Takes values off the front of text that is known to be long enough.
+class Reader {
+ public:
+  explicit Reader(std::string_view text) : rest_(text) {}
+
+  void Take(void* bytes, size_t num_bytes) {
+    if (num_bytes > 0) std::memcpy(bytes, rest_.data(), num_bytes);
+    rest_.remove_prefix(num_bytes);
+  }
+  uint32_t TakeNumber() {
+    uint32_t value = 0;
+    Take(&value, sizeof(value));
+    return value;
+  }
+  template <class Value>
+  void TakeAll(std::vector<Value>& values, size_t num_values) {
+    values.resize(num_values);
+    Take(values.data(), num_values * sizeof(Value));
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+std::string DigestOf(std::string_view text) {
+  Sha256 sha256;
+  sha256.Add(text.data(), text.size());
+  return sha256.HexDigest();
+}
+
+std::string Encode(const VocabularyTree& tree) {
+  Writer writer;
+  writer.Add(kMagic.data(), kMagic.size());
+  writer.AddNumber(kVersion);
+  writer.AddNumber(tree.num_children.size());
+  writer.AddNumber(tree.idf.size());
+  writer.AddNumber(static_cast<size_t>(tree.direct_level));
+  writer.AddNumber(tree.origin.size());
+  writer.Add(tree.origin.data(), tree.origin.size());
+  writer.AddAll(tree.num_children);
+  writer.AddAll(tree.centers);
+  writer.AddAll(tree.idf);
+  return writer.text() + DigestOf(writer.text());
+}
+
+// The text of a file, or an InputError.
+std::string ReadWhole(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw InputError("vocabulary " + path + " does not exist: give a file that `tessera vocabulary train` wrote");
+  }
+  std::string text(static_cast<size_t>(std::filesystem::file_size(path, error)), '\0');
+  std::ifstream file(path, std::ios::binary);
+  if (error || !file.read(text.data(), static_cast<std::streamsize>(text.size()))) {
+    throw InputError("vocabulary " + path + " can't be read: check its permissions");
+  }
+  return text;
+}
+
+VocabularyTree Decode(std::string_view text, const std::string& path) {
+  const std::string name = "vocabulary " + path;
+  if (text.substr(0, kMagic.size()) != kMagic.substr(0, std::min(text.size(), kMagic.size()))) {
+    throw InputError(name + " is not a vocabulary: give a file that `tessera vocabulary train` wrote");
+  }
+  const std::string truncated = name + " is truncated: copy it again, or train it anew";
+  if (text.size() < kHeaderBytes) throw InputError(truncated);
+  Reader reader(text);
+  std::string magic(kMagic.size(), '\0');
+  reader.Take(magic.data(), magic.size());
+  if (const uint32_t version = reader.TakeNumber(); version != kVersion) {
+    throw InputError(name + " is of version " + std::to_string(version) + " and this program reads version " +
+                     std::to_string(kVersion) + ": train it anew with `tessera vocabulary train`");
+  }
+  const size_t num_nodes = reader.TakeNumber();
+  const size_t num_words = reader.TakeNumber();
+  const auto direct_level = static_cast<int32_t>(reader.TakeNumber());
+  const size_t origin_bytes = reader.TakeNumber();
+  const size_t num_bytes = kHeaderBytes + origin_bytes + num_nodes * (sizeof(uint8_t) + sizeof(Descriptor)) +
+                           num_words * sizeof(float) + kDigestBytes;
+  if (text.size() < num_bytes) throw InputError(truncated);
+  const std::string damaged = name + " is damaged: copy it again, or train it anew";
+  if (text.size() > num_bytes || DigestOf(text.substr(0, num_bytes - kDigestBytes)) != text.substr(num_bytes - kDigestBytes)) {
+    throw InputError(damaged);
+  }
+  VocabularyTree tree;
+  tree.direct_level = direct_level;
+  tree.origin.resize(origin_bytes);
+  reader.Take(tree.origin.data(), origin_bytes);
+  reader.TakeAll(tree.num_children, num_nodes);
+  reader.TakeAll(tree.centers, num_nodes);
+  reader.TakeAll(tree.idf, num_words);
+  if (!tree.Check().empty()) throw InputError(damaged);
+  return tree;
+}
+
+}  // namespace
+
+std::shared_ptr<const Vocabulary> Vocabulary::Load(const std::string& path) {
+  return std::make_shared<const Vocabulary>(Decode(ReadWhole(path), path));
+}
+
+void Vocabulary::Save(const std::string& path) const {
+  const std::string unfinished = path + ".unfinished";
+  const std::string text = Encode(tree_);
+  std::ofstream file(unfinished, std::ios::binary | std::ios::trunc);
+  file.write(text.data(), static_cast<std::streamsize>(text.size()));
+  file.close();
+  std::error_code error;
+  if (file) std::filesystem::rename(unfinished, path, error);
+  if (!file || error) {
+    std::filesystem::remove(unfinished, error);
+    throw InputError("vocabulary can't be written to " + path + ": check the folder and its free space");
+  }
+}
+
+}  // namespace tessera
