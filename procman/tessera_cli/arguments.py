@@ -27,6 +27,10 @@ examples:
 """
 
 
+# Of sim:street-short: once around the block and some 40 m of it again.
+DEMO_FRAMES = 593
+
+
 class Parser(argparse.ArgumentParser):
     """Says what is wrong in one sentence instead of printing the whole usage."""
 
@@ -127,6 +131,17 @@ def add_run_commands(commands) -> None:
     add_source_options(record)
 
 
+def add_demo(commands) -> None:
+    demo = add_command(commands, "demo", "demo", "Shows that it works: a drive through a made town, the whole stack, and the result.",
+                       "The drive is rendered into logs/ once and used again.\n\nexamples:\n"
+                       "  procman/tessera demo\n  procman/tessera demo --frames 150\n")
+    demo.add_argument("--frames", type=whole_number(30, DEMO_FRAMES), metavar="N", default=DEMO_FRAMES,
+                      help=f"only the first N frames of the drive, default all {DEMO_FRAMES}; the loop is closed by the last ones")
+    demo.add_argument("--logs", metavar="DIR", help="where the rendered drive is kept and the run's folder is made, default logs/")
+    demo.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-demo")
+    add_port(demo)
+
+
 def add_look_commands(commands) -> None:
     evaluate = add_command(
         commands, "evaluate", "evaluate", "Error of runs or trajectory files against ground truth, by the evo package.",
@@ -160,6 +175,7 @@ def add_look_commands(commands) -> None:
 def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     parser = Parser(prog="procman/tessera", description="A distributed visual SLAM stack over LCM.", allow_abbrev=False)
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
+    add_demo(commands)
     add_run_commands(commands)
     add_look_commands(commands)
     return parser.parse_args(arguments)

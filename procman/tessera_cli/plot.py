@@ -1,12 +1,11 @@
 """trajectory.png: the estimate over the truth, seen from above, and the error along the way."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from tessera_cli.files import unfinished
+from tessera_cli.files import replacing
 from tessera_cli.run_folder import Result, positions_at
 
 AXES = "xyz"
@@ -29,8 +28,8 @@ def draw_path(axes, positions: np.ndarray, across: int, along: int, unit: str) -
 
 
 def save(figure: Figure, path: Path) -> None:
-    figure.savefig(unfinished(path), dpi=120)
-    os.replace(unfinished(path), path)
+    with replacing(path) as written:
+        figure.savefig(written, dpi=120)
 
 
 def draw_loops(axes, result: Result, across: int, along: int) -> None:

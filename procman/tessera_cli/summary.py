@@ -39,7 +39,7 @@ def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
                "ended": facts.ended}
     summary.update({key: evaluated.get(key) for key in EVALUATOR_KEYS})
     summary.update(
-        relocalizations=None, loops_closed=None,  # no stage of today does either
+        relocalizations=evaluated.get("relocalizations"), loops_closed=evaluated.get("loops_closed"),
         rms_error_m=result.error.rms_m if result.error else None,
         alignment=_in_words(result),
         wall_s=round(facts.wall_s, 3),
