@@ -73,7 +73,9 @@ def _in_words(result: Result) -> str:
 
 def _plot(folder: Path, result: Result) -> None:
     summary = result.summary
-    title = f"{summary['source']}, {summary['sensor']}: {summary['frames_tracked']} of {summary['frames']} frames tracked"
+    kind, _, place = summary["source"].partition(":")
+    title = (f"{kind}:{place.rstrip('/').rpartition('/')[2]}, {summary['sensor']}: "
+             f"{summary['frames_tracked']} of {summary['frames']} frames tracked")
     if result.error:
         plot.plot_error(result, title, folder / "trajectory.png")
     elif result.estimate:
