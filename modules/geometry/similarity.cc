@@ -137,7 +137,8 @@ SimilarityEstimate SimilarityProblem::Classify(const Sim3& first_from_second, do
   for (size_t i = 0; i < num_pairs_; ++i) {
     const double moved_z = (first_from_second * in_first_.points[i]).z();
     const bool fits = Fits(first_from_second, factor, i, in_first_) && Fits(second_from_first, factor, i, in_second_) &&
-                      (!UsesDepths() || std::abs(DepthResidual(moved_z, in_second_.points[i].z())) <= kMaxDepthResidual);
+                      (!UsesDepths() ||
+                       std::abs(DepthResidual(moved_z, in_second_.points[i].z())) <= kMaxDepthResidual);
     estimate.is_inlier[i] = fits ? 1 : 0;
     estimate.num_inliers += fits ? 1 : 0;
   }

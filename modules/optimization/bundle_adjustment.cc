@@ -187,10 +187,17 @@ std::string BundleOptions::Check() const {
   if (max_num_iterations < 1 || num_rounds < 1) {
     return "bundle adjustment needs at least one iteration and one round";
   }
+  if (!(initial_radius > 0.0) || !(initial_radius <= kMaxRadius)) {
+    return "initial_radius must be positive and at most 1e10";
+  }
   if (!(function_tolerance >= 0.0) || max_num_dense_poses < 0) {
     return "function_tolerance and max_num_dense_poses must not be negative";
   }
   return {};
+}
+
+BundleOptions GlobalBundleOptions() {
+  return {.max_num_iterations = 12, .num_rounds = 2, .function_tolerance = 1e-6, .initial_radius = 1e5};
 }
 
 std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const BundleOptions& options) {

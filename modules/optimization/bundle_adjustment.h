@@ -57,6 +57,9 @@ struct BundleOptions {
   int max_num_iterations = 10;       // a round; a warm start takes 3 to 6
   int num_rounds = 2;                // after each, observations are sorted anew into inliers and outliers
   double function_tolerance = 1e-4;  // a round ends when a step lowers the cost by less than this part of it
+  // Of the trust region at the start of a round, as Ceres has it: damping is the curvature's diagonal over this. The slow
+  // modes of a long street have a curvature far below the diagonal: where they must move, begin with less damping.
+  double initial_radius = 1e4;
   // Up to this many free poses the reduced camera system is solved dense, above it sparse (CHOLMOD). Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
   int max_num_dense_poses = 60;
@@ -66,6 +69,10 @@ struct BundleOptions {
   // Empty if all is well, else one sentence that says what is out of range.
   std::string Check() const;
 };
+
+// For a whole map after a loop was closed (README.md has the measurements): little damping, and steps that gain little are
+// worth taking, since a street may bend by metres for a millionth of the cost.
+BundleOptions GlobalBundleOptions();
 
 struct BundleResult {
   std::vector<Rigid3> camera_from_world;             // by pose; fixed ones to the bit as given

@@ -10,11 +10,11 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-// d(left perturbation of camera_from_world) / d(tangent). With t = Exp(w) t_base + v:
-//   w' = J dw,   v' + w' x t = dv + w' x (t - v)   =>   v' = dv + [v]x J dw
+// d(left perturbation of camera_from_world) / d(tangent). With t = Exp(w) (t_base + v):
+//   w' = J dw,   v' + w' x t = dt = w' x t + Exp(w) dv   =>   v' = Exp(w) dv
 Matrix6d PerturbationByTangent(const MovingPose& pose) {
-  Matrix6d m = Matrix6d::Identity();
-  m.topRightCorner<3, 3>() = Skew(pose.v) * pose.left_jacobian;
+  Matrix6d m = Matrix6d::Zero();
+  m.topLeftCorner<3, 3>() = pose.turn;
   m.bottomRightCorner<3, 3>() = pose.left_jacobian;
   return m;
 }
@@ -44,15 +44,21 @@ Eigen::Matrix3d LeftJacobianSO3(const Eigen::Vector3d& omega_rad) {
   return Eigen::Matrix3d::Identity() + first * skew + second * skew * skew;
 }
 
+Rigid3 MoveBy(const Rigid3& camera_from_world, const Vector6d& tangent) {
+  const Eigen::Quaterniond turn = ExpSO3(tangent.tail<3>());
+  return {(turn * camera_from_world.rotation).normalized(), turn * (camera_from_world.translation + tangent.head<3>())};
+}
+
 void MovingPose::Update() {
   const Rigid3 pose = CameraFromWorld();
   rotation = pose.rotation.toRotationMatrix();
   translation = pose.translation;
-  v = Eigen::Map<const Eigen::Vector3d>(tangent);
-  left_jacobian = LeftJacobianSO3(Eigen::Map<const Eigen::Vector3d>(tangent + 3));
+  const Eigen::Map<const Eigen::Vector3d> w(tangent + 3);
+  turn = ExpSO3(w).toRotationMatrix();
+  left_jacobian = LeftJacobianSO3(w);
 }
 
-Rigid3 MovingPose::CameraFromWorld() const { return Retract(base, Eigen::Map<const Vector6d>(tangent)); }
+Rigid3 MovingPose::CameraFromWorld() const { return MoveBy(base, Eigen::Map<const Vector6d>(tangent)); }
 
 void PoseUpdater::PrepareForEvaluation(bool /*evaluate_jacobians*/, bool new_evaluation_point) {
   if (new_evaluation_point) {
@@ -82,7 +88,7 @@ bool ReprojectionCost<kRows, kPoseBlocks...>::Evaluate(double const* const* para
   if (jacobians == nullptr) {
     return true;
   }
-  // d(point_in_camera): by the point, R; by v, I; by w, -[point_in_camera - v]x J.
+  // d(point_in_camera): by the point, R; by v, Exp(w); by w, -[point_in_camera]x J.
   const Eigen::Matrix<double, kRows, 3> by_camera = r.by_point.template topRows<kRows>();
   if (jacobians[0] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, kRows, 3, Eigen::RowMajor>> by_point(jacobians[0]);
@@ -90,11 +96,10 @@ bool ReprojectionCost<kRows, kPoseBlocks...>::Evaluate(double const* const* para
   }
   if (jacobians[1] != nullptr) {
     Eigen::Matrix<double, kRows, 6> by_tangent;
-    by_tangent.template leftCols<3>() = by_camera;
-    const Eigen::Vector3d rotated = point_in_camera - pose_.v;
-    Eigen::Matrix<double, kRows, 3> by_rotation;  // row' * -[rotated]x = (rotated x row)'
+    by_tangent.template leftCols<3>() = by_camera.lazyProduct(pose_.turn);
+    Eigen::Matrix<double, kRows, 3> by_rotation;  // row' * -[p]x = (p x row)'
     for (int i = 0; i < kRows; ++i) {
-      by_rotation.row(i) = rotated.cross(by_camera.row(i).transpose()).transpose();
+      by_rotation.row(i) = point_in_camera.cross(by_camera.row(i).transpose()).transpose();
     }
     by_tangent.template rightCols<3>() = by_rotation.lazyProduct(pose_.left_jacobian);
     WriteBlocks<kBlock, kRows>(by_tangent, jacobians + 1);

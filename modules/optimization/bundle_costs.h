@@ -1,9 +1,11 @@
 // The residuals of bundle adjustment as Ceres wants them. Only this module's sources and its tests include this file.
 //
-// A pose is optimised as the tangent (v, w) of Retract at the pose where the solve began, so that Ceres sees plain
-// vectors: camera_from_world = Retract(base, (v, w)). Corrections are far below half a turn, where this is a chart
-// without seams. What depends on the pose alone is computed once an evaluation (EvaluationCallback), not once an
-// observation. Together that saves a fifth of the time of a seven-parameter pose with a Manifold (README.md).
+// A pose is optimised as a tangent (v, w) at the pose where the solve began (MoveBy), so that Ceres sees plain vectors.
+// Corrections are far below half a turn, where this is a chart without seams. Seen from the world a camera's centre moves
+// straight, by v, and w turns the camera where it is. A whole street that bends, cameras and points, is then nearly linear
+// in the parameters, and steps along it can be long; with Retract, where w turns v as well, the first steps after a loop
+// are many times shorter (README.md). What depends on the pose alone is computed once an evaluation
+// (EvaluationCallback), not once an observation.
 #pragma once
 
 #include <ceres/evaluation_callback.h>
@@ -24,18 +26,27 @@ inline constexpr double kBehindResidual = 100.0;
 // Points with a smaller z (metres, or units of the map) count as behind the camera.
 inline constexpr double kMinDepth = 1e-6;
 
+// Trust regions grow no larger: mono's scale has no curvature of its own, only what damping gives, and below a part of
+// 1e-10 of the diagonal rounding would leave the matrix indefinite.
+inline constexpr double kMaxRadius = 1e10;
+
 // J with Exp(w + dw) = Exp(J dw) Exp(w) to first order: the left Jacobian of SO(3); |w| < 2 pi.
 Eigen::Matrix3d LeftJacobianSO3(const Eigen::Vector3d& omega_rad);
+
+// camera_from_world moved by the tangent (v, w), each in the frame of the camera before:
+//
+//   point_in_camera' = Exp(w) (camera_from_world * point_in_world + v)
+Rigid3 MoveBy(const Rigid3& camera_from_world, const Eigen::Matrix<double, 6, 1>& tangent);
 
 // A pose while Ceres moves it.
 struct MovingPose {
   Rigid3 base;                       // camera_from_world at tangent zero
   const double* tangent = nullptr;   // (v, w): Ceres' 6 parameters
 
-  // Of camera_from_world = Retract(base, tangent), as of the last Update().
+  // Of camera_from_world, as of the last Update().
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
-  Eigen::Vector3d v;
+  Eigen::Matrix3d turn;           // Exp(w)
   Eigen::Matrix3d left_jacobian;  // at w
 
   void Update();

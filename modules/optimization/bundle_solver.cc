@@ -161,6 +161,8 @@ std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_
   options.linear_solver_ordering = Ordering();
   options.max_num_iterations = options_.max_num_iterations;
   options.function_tolerance = options_.function_tolerance;
+  options.initial_trust_region_radius = options_.initial_radius;
+  options.max_trust_region_radius = kMaxRadius;
   options.max_solver_time_in_seconds = 1e9;  // iterations bound it, never the clock: results must not depend on load
   options.num_threads = 1;
   options.jacobi_scaling = false;  // the damping is scaled by the diagonal already

@@ -37,7 +37,7 @@ struct PoseGraphProblem {
 };
 
 struct PoseGraphOptions {
-  int max_num_iterations = 20;       // Levenberg-Marquardt steps; loops of 3000 keyframes take 5 to 10
+  int max_num_iterations = 20;       // Levenberg-Marquardt steps; a loop of 3000 keyframes takes 5 to 10
   double function_tolerance = 1e-5;  // ends when a step lowers the cost by less than this part of it
   // Standard deviations of what odometry gets wrong between two keyframes; only their ratios matter (README.md).
   double translation_sigma = 0.01;   // as a part of PoseGraphEdge::length
@@ -50,7 +50,8 @@ struct PoseGraphOptions {
 
 // Minimises over the free S = world_from_keyframe, in Ceres (sparse Cholesky),
 //
-//   1/2 sum_edges weight * |r|^2,   r = (t / (length translation_sigma), log(R) / rotation_sigma_rad, ln(s) / log_scale_sigma)
+//   1/2 sum_edges weight * |r|^2
+//   r = (t / (length translation_sigma), log(R) / rotation_sigma_rad, ln(s) / log_scale_sigma)
 //   (s, R, t) = to_from_from^-1 * (S_to^-1 * S_from)                        what is measured^-1 * what is predicted
 //
 // after H. Strasdat, J. M. M. Montiel, A. Davison, "Scale Drift-Aware Large Scale Monocular SLAM", RSS 2010; (t, log R,

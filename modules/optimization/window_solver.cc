@@ -11,9 +11,7 @@ namespace tessera {
 namespace {
 
 // As Ceres has them.
-constexpr double kInitialRadius = 1e4;
 constexpr double kMinRadius = 1e-32;
-constexpr double kMaxRadius = 1e16;
 constexpr double kMinDiagonal = 1e-6;      // of J'J where damping is scaled by it
 constexpr double kMinRelativeDecrease = 1e-3;
 constexpr double kMinModelDecrease = 1e-14;     // of the cost; below it rounding decides
@@ -51,7 +49,7 @@ std::optional<BundleSummary> WindowSolver::Solve(const std::vector<char>& takes_
   if (is_empty) return std::nullopt;
   BundleSummary summary;
   summary.initial_cost = summary.final_cost = Cost(state_);
-  double radius = kInitialRadius, shrink = 2.0;
+  double radius = options_.initial_radius, shrink = 2.0;
   bool is_linearized = false;
   while (summary.num_iterations < options_.max_num_iterations && radius > kMinRadius) {
     if (!is_linearized) Linearize();
@@ -267,7 +265,7 @@ WindowSolver::State WindowSolver::Moved(const Step& step) const {
   for (size_t i = 0; i < step.poses.size(); ++i) {
     Rigid3& pose = moved.poses[pose_of_free_[i]];
     if (step.poses[i].isZero(0.0)) continue;
-    pose = Retract(pose, step.poses[i]);
+    pose = MoveBy(pose, step.poses[i]);
     moved.rotations[pose_of_free_[i]] = pose.rotation.toRotationMatrix();
   }
   for (size_t i = 0; i < step.points.size(); ++i) moved.positions[i] += step.points[i];

@@ -27,6 +27,10 @@ examples:
 """
 
 
+# Of sim:street-short: once around the block and some 40 m of it again.
+DEMO_FRAMES = 593
+
+
 class Parser(argparse.ArgumentParser):
     """Says what is wrong in one sentence instead of printing the whole usage."""
 
@@ -127,14 +131,29 @@ def add_run_commands(commands) -> None:
     add_source_options(record)
 
 
+def add_demo(commands) -> None:
+    demo = add_command(commands, "demo", "demo", "Shows that it works: a drive through a made town, the whole stack, and the result.",
+                       "The drive is rendered into logs/ once and used again.\n\nexamples:\n"
+                       "  procman/tessera demo\n  procman/tessera demo --frames 150\n")
+    demo.add_argument("--frames", type=whole_number(30, DEMO_FRAMES), metavar="N", default=DEMO_FRAMES,
+                      help=f"only the first N frames of the drive, default all {DEMO_FRAMES}; the loop is closed by the last ones")
+    demo.add_argument("--logs", metavar="DIR", help="where the rendered drive is kept and the run's folder is made, default logs/")
+    demo.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-demo")
+    add_port(demo)
+
+
 def add_look_commands(commands) -> None:
     evaluate = add_command(
-        commands, "evaluate", "evaluate", "Error of a trajectory against ground truth, by the evo package.",
+        commands, "evaluate", "evaluate", "Error of runs or trajectory files against ground truth, by the evo package.",
         "Files hold TUM rows `timestamp tx ty tz qx qy qz qw` or KITTI rows of 12 numbers.\n\nexamples:\n"
         "  procman/tessera evaluate logs/mh01\n"
-        "  procman/tessera evaluate trajectory_kitti.txt data/kitti/poses/03.txt --align sim3\n")
-    evaluate.add_argument("estimate", metavar="RUN|TRAJECTORY", help="a run's folder, or a trajectory file")
-    evaluate.add_argument("truth", metavar="GROUND_TRUTH", nargs="?", help="default: the run's own ground_truth.txt")
+        "  procman/tessera evaluate trajectory_kitti.txt data/kitti/poses/03.txt --align sim3 --report both.html\n"
+        "  procman/tessera evaluate logs/one logs/another --report beside.html\n")
+    evaluate.usage = "procman/tessera evaluate RUN|TRAJECTORY ... [GROUND_TRUTH] [options]"
+    evaluate.add_argument("paths", metavar="RUN|TRAJECTORY ... [GROUND_TRUTH]", nargs="+",
+                          help="runs' folders or trajectory files, one or several; a file behind them is the truth of them all, "
+                          "by default each run's own ground_truth.txt")
+    evaluate.add_argument("--report", metavar="FILE.html", help="a report for people too, with all of them beside each other")
     evaluate.add_argument("--align", choices=("sim3", "se3"),
                           help="default: se3 for a stereo or RGB-D run, sim3 (with scale) otherwise")
     keep_map = add_command(
@@ -156,6 +175,7 @@ def add_look_commands(commands) -> None:
 def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     parser = Parser(prog="procman/tessera", description="A distributed visual SLAM stack over LCM.", allow_abbrev=False)
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
+    add_demo(commands)
     add_run_commands(commands)
     add_look_commands(commands)
     return parser.parse_args(arguments)

@@ -1,6 +1,7 @@
 """Writing files that nobody ever sees half-written, and the places of this checkout."""
 
 import os
+from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -14,6 +15,17 @@ def unfinished(path: Path) -> Path:
     return path.with_name(f".unfinished-{path.name}")
 
 
+@contextmanager
+def replacing(path: Path):
+    """Gives the name to write to; it becomes `path` at the end, and nothing is left if writing fails or is interrupted."""
+    written = unfinished(path)
+    try:
+        yield written
+        os.replace(written, path)
+    finally:
+        written.unlink(missing_ok=True)
+
+
 def write_text(path: Path, text: str) -> None:
-    unfinished(path).write_text(text)
-    os.replace(unfinished(path), path)
+    with replacing(path) as written:
+        written.write_text(text)

@@ -15,6 +15,11 @@ def make_view(title: str):
     return Panel(title) if sys.stdout.isatty() else Lines(title)
 
 
+def make_count(title: str, total: int | None):
+    """Shows how many frames of `total` are done; None: nobody knows how many there will be."""
+    return CountBar(title, total) if sys.stdout.isatty() else CountLines(title, total)
+
+
 def describe_time(seconds: float | None) -> str:
     if seconds is None:
         return "-:--"
@@ -45,6 +50,47 @@ class Lines:
         print(f"tessera: frame {progress.num_poses}{of_all}, {progress.frames_per_s:.1f}/s, "
               f"{describe_time(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
               f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_dropped} dropped", flush=True)
+
+
+class CountLines:
+    """One number that grows, for logs and pipes."""
+
+    def __init__(self, title: str, total: int | None):
+        self._last = time.monotonic()
+        self._title = title
+        self._of_all = f" of {total}" if total else ""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def update(self, number: int) -> None:
+        if time.monotonic() - self._last >= LINE_PERIOD_S:
+            self._last = time.monotonic()
+            print(f"tessera: {self._title}: frame {number}{self._of_all}", flush=True)
+
+
+class CountBar:
+    """The same as a bar, redrawn in place."""
+
+    def __init__(self, title: str, total: int | None):
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, TextColumn, TimeRemainingColumn
+
+        self._bars = Bars(TextColumn("tessera: {task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn("frames"),
+                          TimeRemainingColumn(), TextColumn("left"))
+        self._task = self._bars.add_task(title, total=total)
+
+    def __enter__(self):
+        self._bars.start()
+        return self
+
+    def __exit__(self, *_):
+        self._bars.stop()
+
+    def update(self, number: int) -> None:
+        self._bars.update(self._task, completed=number)
 
 
 class Panel:

@@ -8,6 +8,7 @@ import os
 import tempfile
 import time
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 
 import lcm
@@ -16,12 +17,13 @@ from tessera_cli import settings
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BIN, unfinished
 from tessera_cli.interrupt import Interrupt
-from tessera_cli.panel import LINE_PERIOD_S
+from tessera_cli.log_tail import LogTail
+from tessera_cli.panel import make_count
 from tessera_cli.processes import StageProcess
 from tessera_cli.sources import Source, parse_source
 from tessera_cli.types import end_of_stream_t
 
-POLL_S = 0.05
+POLL_S = 0.1
 
 
 def main(arguments: Namespace) -> int:
@@ -29,16 +31,31 @@ def main(arguments: Namespace) -> int:
     if not source.has_camera_process:
         raise UserError(f"{arguments.source} is on the bus already: record it with .venv/bin/lcm-logger.")
     log = _check_target(arguments.log)
-    written = unfinished(log)
+    num_frames = record(arguments, source, log, keep_interrupted=True)
+    print(f"tessera: {num_frames} frames, {log.stat().st_size / 1e6:.1f} MB in {log}")
+    return 0
+
+
+def record(arguments: Namespace, source: Source, log: Path, keep_interrupted: bool) -> int:
+    """The number of frames in the log, which appears under its name when it is whole. Ctrl-C ends its stream early, or,
+    without `keep_interrupted`, leaves no log and raises KeyboardInterrupt."""
+    written, interrupt = unfinished(log), Interrupt()
     try:
         with tempfile.TemporaryDirectory(prefix="tessera-record-") as folder:
-            _write_log(arguments, source, written, Path(folder))
+            _write_log(arguments, source, written, Path(folder), interrupt, keep_interrupted)
         num_frames = count_frames(written, settings.prefix_of(arguments.settings))
+        if interrupt.requested and not keep_interrupted:
+            raise KeyboardInterrupt
         os.replace(written, log)
     finally:
         written.unlink(missing_ok=True)
-    print(f"tessera: {num_frames} frames, {log.stat().st_size / 1e6:.1f} MB in {log}")
-    return 0
+        _part(written).unlink(missing_ok=True)
+    return num_frames
+
+
+def _part(log: Path) -> Path:
+    """What the camera process writes, until it gives it the log's name."""
+    return log.with_name(f"{log.name}.part")
 
 
 def _check_target(text: str) -> Path:
@@ -50,31 +67,33 @@ def _check_target(text: str) -> Path:
     return log
 
 
-def _write_log(arguments: Namespace, source: Source, log: Path, folder: Path) -> None:
+def _write_log(arguments: Namespace, source: Source, log: Path, folder: Path, interrupt: Interrupt, keep_interrupted: bool) -> None:
     url = f"file://{log}?mode=w"
     assignments = settings.source_assignments(arguments, source) + settings.user_assignments(arguments)
     settings.write_settings(assignments + [f"bus.main_url={url}", f"bus.camera_url={url}"], folder / "settings.yaml")
     camera = StageProcess("camera", [str(BIN / "tessera-camera"), "--settings", str(folder / "settings.yaml"), "--name", "camera"],
                           folder / "camera.log")
-    interrupt = Interrupt()
+    tail = LogTail(_part(log), f"{settings.prefix_of(arguments.settings)}CAMERA")
+    first, last = arguments.frames
     camera.start()
     try:
-        status = _wait(camera, interrupt, log)
+        with make_count(f"recording {source.name}", last - first if last >= 0 else None) as view:
+            status = _wait(camera, interrupt, lambda: view.update(max(0, tail.num_frames() - first)), keep_interrupted)
     finally:
         camera.kill()
     camera.require_success(status)
 
 
-def _wait(camera: StageProcess, interrupt: Interrupt, log: Path) -> int:
-    """The camera's exit status. Ctrl-C ends its stream, which leaves a whole log."""
-    said_at, asked_to_end = time.monotonic(), False
+def _wait(camera: StageProcess, interrupt: Interrupt, show: Callable[[], None], keep_interrupted: bool) -> int:
+    """The camera's exit status."""
+    asked_to_end = False
     while (status := camera.poll()) is None:
+        if interrupt.requested and not keep_interrupted:
+            raise KeyboardInterrupt
         if interrupt.requested and not asked_to_end:
             camera.ask_to_end()
             asked_to_end = True
-        if time.monotonic() - said_at > LINE_PERIOD_S and log.exists():
-            said_at = time.monotonic()
-            print(f"tessera: {log.stat().st_size / 1e6:.0f} MB written", flush=True)
+        show()
         time.sleep(POLL_S)
     return status
 

@@ -3,6 +3,7 @@
 import datetime
 import time
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 
 from tessera_cli import settings
@@ -23,15 +24,16 @@ STALL_TIMEOUT_S = 60.0
 DRAIN_TIMEOUT_S = 3.0
 LISTEN_MS = 50
 # What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
-RUN_FILES = ("summary.json", "run.json", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
-             "keyframes.txt", "map.ply", "ground_truth.txt", "frames.csv", "run.lcmlog", "settings.yaml")
+RUN_FILES = ("summary.json", "run.json", "report.html", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
+             "keyframes.txt", "map.ply", "ground_truth.txt", "frames.csv", "loops.csv", "run.lcmlog", "settings.yaml")
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace, tell: Callable[[dict, Path], str] | None = None) -> int:
+    """`tell`: the words of a summary and its run's folder that are printed at the end, others than the usual ones."""
     source = parse_source(arguments.source_prefix + arguments.source)
     folder = _make_folder(arguments.out, source)
     values = settings.write_settings(settings.run_assignments(arguments, source, folder), folder / "settings.yaml")
-    return Launcher(arguments, source, folder, values).run()
+    return Launcher(arguments, source, folder, values, tell).run()
 
 
 def _make_folder(out: str | None, source: Source) -> Path:
@@ -49,8 +51,9 @@ def _make_folder(out: str | None, source: Source) -> Path:
 
 
 class Launcher:
-    def __init__(self, arguments: Namespace, source: Source, folder: Path, values: dict):
+    def __init__(self, arguments: Namespace, source: Source, folder: Path, values: dict, tell: Callable[[dict, Path], str] | None):
         self._arguments = arguments
+        self._tell = tell
         self._source = source
         self._folder = folder
         self._stack = Stack(folder / "settings.yaml", folder / "stages")
@@ -163,7 +166,7 @@ class Launcher:
     def _print_summary(self, wall_s: float, ended: str) -> None:
         from tessera_cli.summary import in_words
 
-        print(in_words(self._summarize(wall_s, ended), self._folder))
+        print((self._tell or in_words)(self._summarize(wall_s, ended), self._folder))
 
     def _try_to_summarize(self, wall_s: float, sentence: str) -> None:
         """After a failure: what there is, if there is anything."""

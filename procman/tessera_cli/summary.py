@@ -1,13 +1,16 @@
-"""summary.json and trajectory.png of a run, from what the evaluator wrote and the kernel accounted."""
+"""summary.json, trajectory.png and report.html of a run, from what the evaluator wrote and the kernel accounted."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tessera_cli.errors import RunFailed, UserError
+from tessera_cli import plot
+from tessera_cli.errors import RunFailed
 from tessera_cli.files import write_text
+from tessera_cli.report import write_report
+from tessera_cli.run_folder import Result, default_alignment, read_run
 from tessera_cli.stack import Stack
-from tessera_cli.trajectories import TrajectoryError, absolute_error, read_trajectory
+from tessera_cli.versions import collect_versions
 
 # What the evaluator's run.json hands over as it is.
 EVALUATOR_KEYS = ("frames", "frames_tracked", "frames_lost", "frames_initializing", "frames_dropped", "tracking_failures",
@@ -29,16 +32,16 @@ class RunFacts:
 
 
 def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
-    """Writes summary.json and trajectory.png, and returns the summary. Raises RunFailed if the evaluator wrote nothing."""
+    """Writes summary.json, trajectory.png and report.html, and returns the summary. Raises RunFailed if the evaluator wrote nothing."""
     evaluated = _read_evaluation(folder)
-    error, alignment = _measure_error(folder, facts.sensor)
+    result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
     summary = {"source": facts.source, "sensor": facts.sensor, "extractors": facts.extractors, "tiles": facts.tiles,
                "ended": facts.ended}
     summary.update({key: evaluated.get(key) for key in EVALUATOR_KEYS})
     summary.update(
-        relocalizations=None, loops_closed=None,  # no stage of today does either
-        rms_error_m=error.rms_m if error else None,
-        alignment=alignment,
+        relocalizations=evaluated.get("relocalizations"), loops_closed=evaluated.get("loops_closed"),
+        rms_error_m=result.error.rms_m if result.error else None,
+        alignment=_in_words(result),
         wall_s=round(facts.wall_s, 3),
         frames_per_s=round(evaluated["frames"] / facts.wall_s, 3) if facts.wall_s > 0 else None,
         cpu_s={name: round(process.cpu_s, 3) for name, process in stack.processes.items()},
@@ -46,9 +49,12 @@ def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
         messages_undecodable=facts.messages_undecodable,
         extractor_restarts=stack.num_extractor_restarts,
         warnings=stack.warnings,
+        versions=collect_versions(),
     )
-    _plot(folder, summary, error)
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
+    result = replace(result, summary=summary)
+    _plot(folder, result)
+    write_report([result], folder / "report.html")
     return summary
 
 
@@ -59,33 +65,21 @@ def _read_evaluation(folder: Path) -> dict:
         raise RunFailed(f"the evaluator left no results in {folder}; {folder / 'stages' / 'evaluator.log'} may say why.") from error
 
 
-def _measure_error(folder: Path, sensor: str) -> tuple[TrajectoryError | None, str]:
-    """The error, or None, and the alignment in words."""
-    if not _has_poses(folder / "ground_truth.txt"):
-        return None, "none: the source has no ground truth"
-    if not _has_poses(folder / "trajectory.txt"):
-        return None, "none: no frame was tracked"
-    try:
-        error = absolute_error(read_trajectory(folder / "trajectory.txt"), read_trajectory(folder / "ground_truth.txt"),
-                               with_scale=sensor == "mono")
-    except UserError as problem:
-        return None, f"none: {problem}"
-    return error, f"{error.alignment} over {len(error.errors_m)} frames, scale {error.scale:.6g}"
+def _in_words(result: Result) -> str:
+    """The alignment, or why there is none."""
+    error = result.error
+    return f"{error.alignment} over {len(error.errors_m)} frames, scale {error.scale:.6g}" if error else f"none: {result.error_note}"
 
 
-def _has_poses(path: Path) -> bool:
-    return path.is_file() and any(line.strip() and not line.startswith("#") for line in path.read_text().splitlines())
-
-
-def _plot(folder: Path, summary: dict, error: TrajectoryError | None) -> None:
-    from tessera_cli import plot
-
-    title = f"{summary['source']}, {summary['sensor']}: {summary['frames_tracked']} of {summary['frames']} frames tracked"
-    if error:
-        plot.plot_error(error, title, folder / "trajectory.png")
-    elif _has_poses(folder / "trajectory.txt"):
-        unit = "map units" if summary["sensor"] == "mono" else "m"
-        plot.plot_estimate(read_trajectory(folder / "trajectory.txt"), title, unit, folder / "trajectory.png")
+def _plot(folder: Path, result: Result) -> None:
+    summary = result.summary
+    kind, _, place = summary["source"].partition(":")
+    title = (f"{kind}:{place.rstrip('/').rpartition('/')[2]}, {summary['sensor']}: "
+             f"{summary['frames_tracked']} of {summary['frames']} frames tracked")
+    if result.error:
+        plot.plot_error(result, title, folder / "trajectory.png")
+    elif result.estimate:
+        plot.plot_estimate(result, title, folder / "trajectory.png")
 
 
 def in_words(summary: dict, folder: Path) -> str:
@@ -106,7 +100,7 @@ def in_words(summary: dict, folder: Path) -> str:
     lines.append(f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
                  f"{summary['messages_undecodable']} undecodable; extractors started again: {summary['extractor_restarts']}")
     lines += [f"warning: {warning}" for warning in summary["warnings"]]
-    lines.append(f"all of it: {folder}")
+    lines.append(f"report: {folder / 'report.html'}")
     return "\n".join(lines)
 
 

@@ -34,10 +34,17 @@ class TrajectoryError:
     errors_m: np.ndarray  # n
     scale: float  # that the estimate was multiplied by
     alignment: str
+    rotation: np.ndarray  # 3 x 3, truth_from_estimate
+    translation: np.ndarray  # 3, metres
+    num_estimated: int  # poses of the estimate, with a truth or without
 
     @property
     def rms_m(self) -> float:
         return float(np.sqrt(np.mean(self.errors_m**2)))
+
+    def align(self, positions: np.ndarray) -> np.ndarray:
+        """n x 3 of the estimate's world in the truth's: scale * rotation * p + translation."""
+        return self.scale * positions @ self.rotation.T + self.translation
 
 
 def read_trajectory(path: Path) -> Trajectory:
@@ -98,13 +105,19 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
     if true_path.num_poses < MIN_POSES:
         raise UserError(f"only {true_path.num_poses} poses have a ground truth; an alignment needs {MIN_POSES}.")
     try:
-        _, _, scale = estimated_path.align(true_path, correct_scale=with_scale)
+        rotation, translation, scale = estimated_path.align(true_path, correct_scale=with_scale)
     except GeometryException as error:
         raise UserError("the poses don't determine an alignment: the camera stood still or moved on a line.") from error
     error = metrics.APE(metrics.PoseRelation.translation_part)
     error.process_data((true_path, estimated_path))
     return TrajectoryError(np.asarray(true_path.timestamps), estimated_path.positions_xyz, true_path.positions_xyz,
-                           np.asarray(error.error), float(scale), "Sim(3)" if with_scale else "SE(3)")
+                           np.asarray(error.error), float(scale), "Sim(3)" if with_scale else "SE(3)",
+                           rotation, translation, len(estimate.positions))
+
+
+def length_m(positions: np.ndarray) -> float:
+    """Of the way from the first of n x 3 positions to the last."""
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
 
 def _to_evo(trajectory: Trajectory):

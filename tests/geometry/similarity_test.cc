@@ -5,7 +5,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/sha256.h"
 #include "geometry/synthetic_views.h"
+#include "other_process.h"
 
 namespace tessera {
 namespace {
@@ -21,7 +23,7 @@ struct WorldOptions {
   size_t num_pairs = 150;
   double noise_px = 0.0;
   double depth_noise = 0.0;    // of each map's points, along the ray, as a part of the depth
-  size_t outlier_step = 0;     // every so manieth pair joins different points (0: none)
+  size_t outlier_step = 0;     // every outlier_step-th pair joins different points (0: none)
   double baseline_m = 0.0;     // > 0: with right columns
   uint64_t seed = 5;
 };
@@ -203,6 +205,13 @@ TEST(EstimateSimilarity, SameSeedSameBits) {
   const auto b = EstimateSimilarity(MakeCamera(), copy, 9, {});
   ASSERT_TRUE(a && b);
   EXPECT_TRUE(SameBits(*a, *b));
+  const Sim3& found = a->first_from_second;
+  Sha256 hash;
+  for (const double value : {found.scale, found.rotation.w(), found.rotation.x(), found.rotation.y(),
+                             found.rotation.z(), found.translation.x(), found.translation.y(), found.translation.z()}) {
+    hash.Add(value);
+  }
+  ExpectSameInAnotherProcess(hash.HexDigest());
 }
 
 TEST(SimilarityOptions, OutOfRangeThrows) {

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "optimization/synthetic_bundle.h"
+#include "optimization/synthetic_street.h"
 
 namespace tessera {
 namespace {
@@ -107,6 +108,29 @@ TEST(AdjustBundle, WindowSolverTakesTheStepsOfCeres) {
       EXPECT_LT(MaxPoseError(*a, b->camera_from_world), 1e-3) << iterations;
     }
   }
+}
+
+// After a loop the error that is left bends the whole street: metres, for a millionth of the cost.
+TEST(AdjustBundle, StraightensAStreetAfterItsLoop) {
+  const SyntheticBundle bundle = MakeSyntheticStreet({.num_keyframes = 150, .num_new_landmarks = 30});
+  const auto rms = [&](const std::vector<Rigid3>& camera_from_world) {
+    std::vector<Eigen::Vector3d> centers, truth;
+    for (size_t i = 0; i < camera_from_world.size(); ++i) {
+      centers.push_back(camera_from_world[i].Inverse().translation);
+      truth.push_back(bundle.camera_from_world[i].Inverse().translation);
+    }
+    return AlignPoints(centers, truth, true)->rms;
+  };
+  std::vector<Rigid3> start;
+  for (const BundlePose& pose : bundle.problem.poses) start.push_back(pose.camera_from_world);
+  const auto result = AdjustBundle(bundle.problem, GlobalBundleOptions());
+  BundleOptions exhaustive = GlobalBundleOptions();
+  exhaustive.max_num_iterations = 100;
+  exhaustive.function_tolerance = 1e-10;
+  const auto limit = AdjustBundle(bundle.problem, exhaustive);
+  ASSERT_TRUE(result && limit);
+  EXPECT_LT(rms(result->camera_from_world), 0.3 * rms(start));
+  EXPECT_LT(rms(result->camera_from_world), 1.3 * rms(limit->camera_from_world));
 }
 
 TEST(AdjustBundle, TwoViewsKeepTheFirstPoseAndTheDistanceToTheSecond) {
@@ -320,6 +344,8 @@ TEST(AdjustBundle, MalformedProblemsThrowWithASentence) {
     EXPECT_THROW(AdjustBundle(problem, {}), std::invalid_argument) << i;
   }
   EXPECT_THROW(AdjustBundle(bundle.problem, {.max_num_iterations = 0}), std::invalid_argument);
+  EXPECT_THROW(AdjustBundle(bundle.problem, {.initial_radius = 0.0}), std::invalid_argument);
+  EXPECT_TRUE(GlobalBundleOptions().Check().empty());
 }
 
 }  // namespace
