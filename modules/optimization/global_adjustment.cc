@@ -23,8 +23,6 @@ LocalWindow WholePart(const Map& map, KeyframeId root) {
 
 }  // namespace
 
-BundleOptions GlobalBundleOptions() { return {.max_num_iterations = 15, .num_rounds = 2, .max_num_dense_poses = 60}; }
-
 GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOptions& options) {
   if (map.FindKeyframe(asked) == nullptr) throw std::invalid_argument("the keyframe to be adjusted is not in the map");
   GlobalAdjustment adjustment;

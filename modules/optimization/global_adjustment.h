@@ -7,9 +7,6 @@
 
 namespace tessera {
 
-// Rounds enough to settle a map that a pose graph has bent, each bounded.
-BundleOptions GlobalBundleOptions();
-
 // Optimises the part of the map that holds keyframe `asked`: all its keyframes but the root of its spanning tree, and all
 // landmarks that two of them see. The result answers `asked`; it is not usable where the solver found nothing better.
 // Throws std::invalid_argument if there is no such keyframe.

@@ -18,6 +18,7 @@
 #include "map/map_exchange.h"
 #include "map/tracking_types.h"
 #include "transport/bytes.h"
+#include "transport/map_file.h"
 #include "transport/stage_messages.h"
 #include "transport/stream_messages.h"
 

@@ -36,7 +36,7 @@ class Dealer {
   size_t next_ = 0;
 };
 
-seen_landmark_t ToMessage(const SeenLandmark& seen) {
+seen_landmark_t MessageOf(const SeenLandmark& seen) {
   seen_landmark_t message;
   message.keypoint = seen.keypoint;
   message.landmark = seen.landmark.value;
@@ -80,7 +80,7 @@ struct Codec<LoopResult> {
         part.keyframe = correction.id.value;
         part.new_world_from_old = ToMessage(correction.new_world_from_old);
       });
-      seen.Deal(kBytesPerSeen, &room, [&](const SeenLandmark& item) { message->seen.push_back(tessera::ToMessage(item)); });
+      seen.Deal(kBytesPerSeen, &room, [&](const SeenLandmark& item) { message->seen.push_back(MessageOf(item)); });
       message->num_corrections = static_cast<int32_t>(message->corrections.size());
       message->num_seen = static_cast<int32_t>(message->seen.size());
       emit(*message);
@@ -225,7 +225,7 @@ struct Codec<RelocalizationAnswer> {
     do {
       size_t room = std::max(max_bytes - std::min(max_bytes, overhead), kBytesPerSeen);
       message->seen.clear();
-      seen.Deal(kBytesPerSeen, &room, [&](const SeenLandmark& item) { message->seen.push_back(tessera::ToMessage(item)); });
+      seen.Deal(kBytesPerSeen, &room, [&](const SeenLandmark& item) { message->seen.push_back(MessageOf(item)); });
       message->num_seen = static_cast<int32_t>(message->seen.size());
       emit(*message);
     } while (!seen.done());

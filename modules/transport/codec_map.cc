@@ -1,8 +1,9 @@
-// MAP_DELTA, MAP_SNAPSHOT, MAP_REQUEST.
+// MAP_DELTA, MAP_SNAPSHOT, MAP_REQUEST; and what a map file begins with.
 #include <algorithm>
 
 #include "map/map_exchange.h"
 #include "tessera/map_delta_t.hpp"
+#include "tessera/map_file_t.hpp"
 #include "tessera/map_request_t.hpp"
 #include "tessera/map_snapshot_t.hpp"
 #include "transport/codec_impl.h"
@@ -86,6 +87,29 @@ struct Codec<MapSnapshotPage> {
   }
 };
 TESSERA_CODEC(MapSnapshotPage);
+
+template <>
+struct Codec<MapFileHeader> {
+  using Message = map_file_t;
+  static constexpr const char* kTypeName = "map_file_t";
+
+  template <class Emit>
+  static void Cut(const MapFileHeader& header, Message* message, size_t, Emit emit) {
+    message->version = header.version;
+    message->num_pages = header.num_pages;
+    message->num_keyframes = header.num_keyframes;
+    message->num_landmarks = header.num_landmarks;
+    message->camera = ToMessage(header.camera);
+    emit(*message);
+  }
+  static std::string Join(const Message& message, MapFileHeader* header) {
+    *header = {message.version, message.num_pages, message.num_keyframes, message.num_landmarks, {}};
+    return FirstProblem({Require(message.num_pages >= 1 && message.num_keyframes >= 0 && message.num_landmarks >= 0,
+                                 "one of its counts is out of range"),
+                         FromMessage(message.camera, &header->camera)});
+  }
+};
+TESSERA_CODEC(MapFileHeader);
 
 template <>
 struct Codec<MapRequest> {

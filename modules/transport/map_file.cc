@@ -4,11 +4,8 @@
 
 #include "core/errors.h"
 #include "map/map_exchange.h"
-#include "tessera/map_file_t.hpp"
 #include "transport/channels.h"
 #include "transport/codec.h"
-#include "transport/codec_impl.h"
-#include "transport/codec_parts.h"
 #include "transport/log_file.h"
 
 namespace tessera {
@@ -17,6 +14,7 @@ namespace {
 constexpr const char* kHeaderChannel = "MAP_FILE";
 constexpr const char* kPublisher = "map_file";
 constexpr size_t kMaxMessageBytes = 60000;
+constexpr int32_t kVersion = 1;
 
 CameraCalibration CameraOf(const Map& map) {
   CameraCalibration camera;
@@ -28,32 +26,20 @@ CameraCalibration CameraOf(const Map& map) {
   return camera;
 }
 
-Bytes HeaderMessage(const Map& map, int32_t num_pages) {
-  map_file_t message{};
-  SetHeader({.publisher = kPublisher}, &message.header);
-  message.version = map_file_t::VERSION;
-  message.num_pages = num_pages;
-  message.num_keyframes = map.keyframes().size();
-  message.num_landmarks = map.landmarks().size();
-  message.camera = ToMessage(CameraOf(map));
-  return EncodeMessage(message);
-}
-
 [[noreturn]] void Refuse(const std::string& path, const std::string& problem) {
   throw InputError("map file " + path + " " + problem);
 }
 
-map_file_t ReadHeaderMessage(LogFileReader& file, const std::string& path) {
+MapFileHeader ReadFileHeader(LogFileReader& file, const std::string& path) {
   LogEvent event;
   if (!file.Next(&event) || event.channel != kHeaderChannel) Refuse(path, "is no map: it does not begin like one");
-  map_file_t header;
-  const WireType* type = WireType::Of(event.data);
-  if (type == nullptr || type != &WireType::Named("map_file_t") || !DecodeMessage(event.data, &header) ||
-      header.version != map_file_t::VERSION) {
+  ValueJoiner<MapFileHeader> joiner;
+  const auto header = ReadHeader(event.data);
+  if (!header || joiner.Add(event.data, *header) != ValueJoiner<MapFileHeader>::Result::kComplete ||
+      joiner.value().version != kVersion) {
     Refuse(path, "was written by another version of Tessera: make the map again with this one");
   }
-  if (header.num_pages < 1) Refuse(path, "is damaged: it has no pages");
-  return header;
+  return joiner.value();
 }
 
 }  // namespace
@@ -62,8 +48,9 @@ void WriteMapFile(const Map& map, const std::string& path) {
   const MapDelta snapshot = map.Snapshot();
   const int32_t num_pages = NumSnapshotPages(snapshot);
   LogFileWriter file(path);
-  file.Write(0, kHeaderChannel, HeaderMessage(map, num_pages));
-  int64_t sequence = 0;
+  const MapFileHeader file_header{kVersion, num_pages, map.keyframes().size(), map.landmarks().size(), CameraOf(map)};
+  file.Write(0, kHeaderChannel, EncodeValue(file_header, {.publisher = kPublisher}, kMaxMessageBytes).front());
+  int64_t sequence = 1;
   for (int32_t page = 0; page < num_pages; ++page) {
     const MessageHeader header{.publisher = kPublisher, .sequence = sequence};
     for (const Bytes& message : EncodeValue(CutSnapshotPage(snapshot, page), header, kMaxMessageBytes)) {
@@ -75,7 +62,7 @@ void WriteMapFile(const Map& map, const std::string& path) {
 
 MapDelta ReadMapFile(const std::string& path) {
   LogFileReader file(path);
-  const map_file_t header = ReadHeaderMessage(file, path);
+  const MapFileHeader header = ReadFileHeader(file, path);
   ValueJoiner<MapSnapshotPage> joiner;
   MapDelta snapshot;
   int32_t num_pages = 0;

@@ -97,6 +97,10 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-<source name>")
     parser.add_argument("--live", action="store_true",
                         help="the tracker never waits for the mapper; a recording of such a run is replayed just as it went")
+    parser.add_argument("--no-loop-closing", action="store_true", help="the map is never bent to make a place seen twice one")
+    parser.add_argument("--load-map", metavar="FILE", help="go on in the map of an earlier run: its map.tessera")
+    parser.add_argument("--save-map", metavar="FILE", help="one more copy of the run's map.tessera")
+    parser.add_argument("--localize-only", action="store_true", help="find the camera in the map of --load-map, and leave the map as it is")
     parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
     add_port(parser)
 

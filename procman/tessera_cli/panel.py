@@ -49,7 +49,7 @@ class Lines:
         of_all = f" of {progress.num_frames}" if progress.num_frames else ""
         print(f"tessera: frame {progress.num_poses}{of_all}, {progress.frames_per_s:.1f}/s, "
               f"{describe_time(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
-              f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_dropped} dropped", flush=True)
+              f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, {progress.num_dropped} dropped", flush=True)
 
 
 class CountLines:
@@ -145,7 +145,7 @@ def _draw_bar(progress: Progress):
 
 def _tracking_line(progress: Progress) -> str:
     return (f"tracking: {progress.tracking_state or 'no pose yet'}   keyframes: {progress.num_keyframes}   "
-            f"landmarks: {progress.num_landmarks}   dropped: {progress.num_dropped}")
+            f"landmarks: {progress.num_landmarks}   loops: {progress.num_loops}   dropped: {progress.num_dropped}")
 
 
 def _draw_stages(progress: Progress):

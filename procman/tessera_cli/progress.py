@@ -80,6 +80,10 @@ class Progress:
     def num_landmarks(self) -> int:
         return self._of_map("landmarks")
 
+    @property
+    def num_loops(self) -> int:
+        return self._of_map("loops")
+
     def _of_map(self, name: str) -> int:
         return int(self.stages["mapper"].values.get(name, 0)) if "mapper" in self.stages else 0
 

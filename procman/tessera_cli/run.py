@@ -18,14 +18,17 @@ from tessera_cli.stack import Stack
 
 # A process that has not said by then that it runs never will; LCM's own self-test may take 10 s.
 START_TIMEOUT_S = 20.0
-# A stored source without a new pose for this long is stuck; repairs and late tiles take a few seconds.
-STALL_TIMEOUT_S = 60.0
+# A stored source without a new pose for this long is stuck; repairs and late tiles take a few seconds, the
+# adjustment of a large map a minute.
+STALL_TIMEOUT_S = 120.0
+# When the last frame has its pose, the map may be bent and adjusted as a whole once more; it takes as long as the map is large.
+ENDING_TIMEOUT_S = 900.0
 # After Ctrl-C the frames on their way get this long to be tracked.
 DRAIN_TIMEOUT_S = 3.0
 LISTEN_MS = 50
 # What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
 RUN_FILES = ("summary.json", "run.json", "report.html", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
-             "keyframes.txt", "map.ply", "ground_truth.txt", "frames.csv", "loops.csv", "run.lcmlog", "settings.yaml")
+             "keyframes.txt", "map.ply", "map.tessera", "ground_truth.txt", "frames.csv", "loops.csv", "run.lcmlog", "settings.yaml")
 
 
 def main(arguments: Namespace, tell: Callable[[dict, Path], str] | None = None) -> int:
@@ -90,7 +93,7 @@ class Launcher:
         """The camera comes last: nobody misses its first frame."""
         if self._source.has_camera_process and not self._bus.is_free():
             raise UserError("another stack runs on this bus: end it, or give --port N to keep the two apart.")
-        for stage in ("evaluator", "mapper", "tracker", "reassembler", "dispatcher"):
+        for stage in ("evaluator", "mapper", "loop_closer", "global_adjuster", "tracker", "reassembler", "dispatcher"):
             self._stack.start(stage)
         for instance in range(self._arguments.extractors):
             self._stack.start("extractor", instance)
@@ -149,7 +152,8 @@ class Launcher:
     def _check_stall(self) -> None:
         progress = self._bus.progress
         since = max(progress.last_pose_at or 0.0, progress.started_at)
-        if self._source.is_live or time.monotonic() - since < STALL_TIMEOUT_S:
+        has_all_poses = progress.num_frames is not None and progress.num_poses >= progress.num_frames
+        if self._source.is_live or time.monotonic() - since < (ENDING_TIMEOUT_S if has_all_poses else STALL_TIMEOUT_S):
             return
         errors = [f"{report.name}: {report.last_error}" for report in progress.stages.values() if report.last_error]
         raise RunFailed(f"no pose for {STALL_TIMEOUT_S:.0f} s after {progress.num_poses} frames; "

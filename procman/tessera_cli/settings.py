@@ -14,7 +14,8 @@ GROUP = "239.255.76.67"
 FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
 # Keys that the command itself fills in.
 RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE", "tracker.live": "--live",
-            "tracker.replay_log": "replay LOG"}
+            "tracker.replay_log": "replay LOG", "mapper.close_loops": "--no-loop-closing", "mapper.load_map": "--load-map FILE",
+            "evaluator.save_map": "--save-map FILE", "tracker.localize_only": "--localize-only"}
 
 
 def bus_url(port: int) -> str:
@@ -61,9 +62,29 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
         assignments.append(f"tracker.replay_log={source.text.removeprefix('log:')}")
     if arguments.record:
         assignments.append(f"recorder.path={out_dir / 'run.lcmlog'}")
+    assignments += map_assignments(arguments)
     if arguments.features:
         assignments.append(f"features.num_features={arguments.features}")
     return assignments + user_assignments(arguments)
+
+
+def map_assignments(arguments: Namespace) -> list[str]:
+    assignments = ["mapper.close_loops=false"] if arguments.no_loop_closing else []
+    if arguments.load_map:
+        path = Path(arguments.load_map).expanduser().absolute()
+        if not path.is_file():
+            raise UserError(f"--load-map {arguments.load_map}: there is no file {path}.")
+        assignments.append(f"mapper.load_map={path}")
+    if arguments.localize_only:
+        if not arguments.load_map:
+            raise UserError("--localize-only needs a map: give --load-map FILE, the map.tessera of an earlier run.")
+        assignments.append("tracker.localize_only=true")
+    if arguments.save_map:
+        path = Path(arguments.save_map).expanduser().absolute()
+        if not path.parent.is_dir():
+            raise UserError(f"--save-map {arguments.save_map}: there is no folder {path.parent}.")
+        assignments.append(f"evaluator.save_map={path}")
+    return assignments
 
 
 def user_assignments(arguments: Namespace) -> list[str]:

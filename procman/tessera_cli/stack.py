@@ -1,4 +1,4 @@
-"""All processes of one run. Extractors that die, and a mapper that is killed, are started again; any other death ends the run."""
+"""All processes of one run. Extractors that die, and stages of the map that are killed, are started again; any other death ends the run."""
 
 import time
 from pathlib import Path
@@ -14,6 +14,8 @@ LONGEST_BACK_OFF_S = 5.0
 STABLE_AFTER_S = 10.0
 # One that dies so often in a row has a fault that starting it again does not mend.
 MAX_DEATHS_IN_A_ROW = 6
+# Stages that build their state again when they were killed.
+REBUILT = ("mapper", "loop_closer", "global_adjuster")
 # What SIGTERM has not ended after this long is killed.
 STOP_TIMEOUT_S = 5.0
 
@@ -58,8 +60,8 @@ class Stack:
             return
         if status == 2:
             raise UserError(f"{process.name}: {process.last_words()}")
-        # A mapper that fails by its own decision would do so again; one that was killed builds the same map again.
-        can_go_on = process.name.startswith("extractor_") or (process.name == "mapper" and status < 0)
+        # One that fails by its own decision would do so again; one that was killed gets what it lacks from the others.
+        can_go_on = process.name.startswith("extractor_") or (process.name in REBUILT and status < 0)
         if not can_go_on:
             raise RunFailed(f"{process.name} {describe_exit(status)}; the last line of {process.log_path}: {process.last_words()}")
         lived_s = time.monotonic() - process.started_at

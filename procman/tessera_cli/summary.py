@@ -14,7 +14,7 @@ from tessera_cli.versions import collect_versions
 
 # What the evaluator's run.json hands over as it is.
 EVALUATOR_KEYS = ("frames", "frames_tracked", "frames_lost", "frames_initializing", "frames_dropped", "tracking_failures",
-                  "keyframes", "landmarks", "pose_time_ms", "latency_ms", "map_wait_ms", "stage_ms", "messages_repaired", "messages_lost",
+                  "relocalizations", "keyframes", "landmarks", "loops_closed", "stage_values", "pose_time_ms", "latency_ms", "map_wait_ms", "stage_ms", "messages_repaired", "messages_lost",
                   "trajectory_sha256", "map_sha256")
 
 
@@ -39,7 +39,6 @@ def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
                "ended": facts.ended}
     summary.update({key: evaluated.get(key) for key in EVALUATOR_KEYS})
     summary.update(
-        relocalizations=evaluated.get("relocalizations"), loops_closed=evaluated.get("loops_closed"),
         rms_error_m=result.error.rms_m if result.error else None,
         alignment=_in_words(result),
         wall_s=round(facts.wall_s, 3),
@@ -82,21 +81,35 @@ def _plot(folder: Path, result: Result) -> None:
         plot.plot_estimate(result, title, folder / "trajectory.png")
 
 
+def _loops_in_words(summary: dict) -> str:
+    """How many candidates for a loop each check let through."""
+    counts = (summary.get("stage_values") or {}).get("loop_closer", {})
+    if not counts.get("loop_candidates"):
+        return ""
+    alike, consistent, matched, aligned, confirmed = (
+        int(counts.get(f"loop_{name}", 0)) for name in ("candidates", "consistent", "matched", "aligned", "confirmed"))
+    return (f"loop candidates: {alike} places looked alike, {consistent} also from the keyframes before, {matched} shared enough landmarks, "
+            f"{aligned} agreed on where the camera stood, {confirmed} were confirmed")
+
+
 def in_words(summary: dict, folder: Path) -> str:
     """The result for people, a few lines."""
     lines = [
         f"{summary['frames']} frames in {summary['wall_s']:.1f} s ({summary['frames_per_s'] or 0:.1f}/s): "
         f"{summary['frames_tracked']} tracked, {summary['frames_initializing']} before the start of the map, "
         f"{summary['frames_lost']} lost, {summary['frames_dropped']} dropped",
-        f"map: {summary['keyframes']} keyframes, {summary['landmarks']} landmarks",
+        f"map: {summary['keyframes']} keyframes, {summary['landmarks']} landmarks, {summary['loops_closed'] or 0} loops closed; "
+        f"tracking failures: {summary['tracking_failures']}, relocalizations: {summary['relocalizations']}",
     ]
+    if words := _loops_in_words(summary):
+        lines.append(words)
     if summary["rms_error_m"] is not None:
         lines.append(f"RMS error {summary['rms_error_m']:.3f} m after alignment by {summary['alignment']}")
     else:
         lines.append(f"error: {summary['alignment']}")
     lines.append(f"{_statistics('pose time', summary['pose_time_ms'])}; {_statistics('latency', summary['latency_ms'])}")
     if wait := summary["map_wait_ms"]:
-        lines.append(f"the tracker waited for the mapper {wait['mean']:.1f} ms a frame, 95 % {wait['p95']:.1f} ms")
+        lines.append(f"the tracker waited for the mapper {wait['mean']:.1f} ms a frame, 95 % {wait['p95']:.1f} ms, longest {wait['max']:.0f} ms")
     lines.append(f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
                  f"{summary['messages_undecodable']} undecodable; extractors started again: {summary['extractor_restarts']}")
     lines += [f"warning: {warning}" for warning in summary["warnings"]]

@@ -15,9 +15,9 @@ namespace {
 
 // Each stage speaks twice a second; the figures of a run are those that it gives after the end.
 constexpr int64_t kMaxWaitForStatusUs = 1'000'000;
-// After the tracker's end, a pose or a change of the map that has not come for this long won't come any more; a bundle
-// adjustment on a busy machine takes a second or two.
-constexpr int64_t kLastNewsTimeoutUs = 10'000'000;
+// After the tracker's end, a pose or a change of the map that has not come for this long won't come any more; a global bundle
+// adjustment of a large map takes a minute on a busy machine.
+constexpr int64_t kLastNewsTimeoutUs = 120'000'000;
 
 StageFigures FiguresOf(const StageStatus& status) {
   const StepStatistics& step = status.step;

@@ -5,6 +5,7 @@
 
 #include "map/loop_types.h"
 #include "optimization/bundle_adjustment.h"
+#include "geometry/camera_frame.h"
 #include "transport/map_subscription.h"
 #include "transport/stage.h"
 
