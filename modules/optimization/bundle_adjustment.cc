@@ -188,7 +188,7 @@ std::string BundleOptions::Check() const {
     return "bundle adjustment needs at least one iteration and one round";
   }
   if (!(initial_radius > 0.0) || !(initial_radius <= kMaxRadius)) {
-    return "initial_radius must be positive and at most 1e8";
+    return "initial_radius must be positive and at most 1e10";
   }
   if (!(function_tolerance >= 0.0) || max_num_dense_poses < 0) {
     return "function_tolerance and max_num_dense_poses must not be negative";

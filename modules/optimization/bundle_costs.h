@@ -27,8 +27,8 @@ inline constexpr double kBehindResidual = 100.0;
 inline constexpr double kMinDepth = 1e-6;
 
 // Trust regions grow no larger: mono's scale has no curvature of its own, only what damping gives, and below a part of
-// 1e-8 of the diagonal rounding would leave the matrix indefinite.
-inline constexpr double kMaxRadius = 1e8;
+// 1e-10 of the diagonal rounding would leave the matrix indefinite.
+inline constexpr double kMaxRadius = 1e10;
 
 // J with Exp(w + dw) = Exp(J dw) Exp(w) to first order: the left Jacobian of SO(3); |w| < 2 pi.
 Eigen::Matrix3d LeftJacobianSO3(const Eigen::Vector3d& omega_rad);
