@@ -12,7 +12,7 @@ from tessera_cli.report import TEMPLATES, write_report
 from tessera_cli.run_folder import read_pair, read_run
 from tessera_cli.words import remarks
 
-VOID = {"meta", "link", "br", "hr", "img", "input"}
+VOID = {"meta", "wbr", "link", "br", "hr", "img", "input"}
 # Namespaces are names that nobody fetches.
 NAMESPACES = ("http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink")
 FIGURES_OF_A_RUN = 9
@@ -132,7 +132,7 @@ def test_the_result_is_told_in_words(page):
     for sentence in (f"{tracked} of {NUM_FRAMES} frames were tracked", "1 loop was closed.", "Tracking failed 2 times",
                      "found again 2 times", "4 frames found no pose: 40 to 42, 77.", "4.3 times as fast as the camera"):
         assert sentence in words, words[:1000]
-    assert "features.num_features" in words and "1234" in words and "0123456789ab" in words
+    assert "num_features" in words and "1234" in words and "0123456789ab" in words
 
 
 def test_figures_follow_the_colours_of_the_page(page):
