@@ -42,10 +42,11 @@ std::vector<std::vector<Descriptor>> CollectDescriptors(const Arguments& argumen
   Extractor extractor;
   for (const std::string& source : arguments.sources) {
     const size_t num_before = images.size();
-    const auto skipped = ForEachTrainingView(source, arguments.views, [&](const GrayImage& image, const CameraCalibration& calibration) {
+    const auto take = [&](const GrayImage& image, const CameraCalibration& calibration) {
       FeatureFrame features = ExtractView(image, calibration, arguments.features, extractor);
       if (!features.descriptors.empty()) images.push_back(std::move(features.descriptors));
-    });
+    };
+    const std::vector<std::string> skipped = ForEachTrainingView(source, arguments.views, take);
     for (const std::string& sentence : skipped) std::cerr << "left out: " << sentence << "\n";
     std::printf("%s: %zu images\n", source.c_str(), images.size() - num_before);
     std::fflush(stdout);

@@ -21,6 +21,8 @@ constexpr std::string_view kMagic = "tessera vocabulary\n";
 constexpr uint32_t kVersion = 1;
 constexpr size_t kHeaderBytes = kMagic.size() + 5 * sizeof(uint32_t);
 constexpr size_t kDigestBytes = 64;
+constexpr const char* kIsTruncated = " is truncated: copy it again, or train it anew";
+constexpr const char* kIsDamaged = " is damaged: copy it again, or train it anew";
 
 static_assert(std::endian::native == std::endian::little, "numbers go to the file as they stand in memory");
 
@@ -50,6 +52,7 @@ class Reader {
     if (num_bytes > 0) std::memcpy(bytes, rest_.data(), num_bytes);
     rest_.remove_prefix(num_bytes);
   }
+  void Skip(size_t num_bytes) { rest_.remove_prefix(num_bytes); }
   uint32_t TakeNumber() {
     uint32_t value = 0;
     Take(&value, sizeof(value));
@@ -100,46 +103,61 @@ std::string ReadWhole(const std::string& path) {
   return text;
 }
 
-VocabularyTree Decode(std::string_view text, const std::string& path) {
-  const std::string name = "vocabulary " + path;
-  if (text.substr(0, kMagic.size()) != kMagic.substr(0, std::min(text.size(), kMagic.size()))) {
+struct Header {
+  size_t num_nodes = 0;
+  size_t num_words = 0;
+  int32_t direct_level = 0;
+  size_t origin_bytes = 0;
+
+  // Of the whole file.
+  size_t num_bytes() const {
+    return kHeaderBytes + origin_bytes + num_nodes * (sizeof(uint8_t) + sizeof(Descriptor)) + num_words * sizeof(float) +
+           kDigestBytes;
+  }
+};
+
+// Leaves `reader` behind the header. `name` is for sentences.
+Header TakeHeader(std::string_view text, const std::string& name, Reader& reader) {
+  if (text.substr(0, kMagic.size()) != kMagic.substr(0, text.size())) {
     throw InputError(name + " is not a vocabulary: give a file that `tessera vocabulary train` wrote");
   }
-  const std::string truncated = name + " is truncated: copy it again, or train it anew";
-  if (text.size() < kHeaderBytes) throw InputError(truncated);
-  Reader reader(text);
-  std::string magic(kMagic.size(), '\0');
-  reader.Take(magic.data(), magic.size());
+  if (text.size() < kHeaderBytes) throw InputError(name + kIsTruncated);
+  reader.Skip(kMagic.size());
   if (const uint32_t version = reader.TakeNumber(); version != kVersion) {
     throw InputError(name + " is of version " + std::to_string(version) + " and this program reads version " +
                      std::to_string(kVersion) + ": train it anew with `tessera vocabulary train`");
   }
-  const size_t num_nodes = reader.TakeNumber();
-  const size_t num_words = reader.TakeNumber();
-  const auto direct_level = static_cast<int32_t>(reader.TakeNumber());
-  const size_t origin_bytes = reader.TakeNumber();
-  const size_t num_bytes = kHeaderBytes + origin_bytes + num_nodes * (sizeof(uint8_t) + sizeof(Descriptor)) +
-                           num_words * sizeof(float) + kDigestBytes;
-  if (text.size() < num_bytes) throw InputError(truncated);
-  const std::string damaged = name + " is damaged: copy it again, or train it anew";
-  if (text.size() > num_bytes || DigestOf(text.substr(0, num_bytes - kDigestBytes)) != text.substr(num_bytes - kDigestBytes)) {
-    throw InputError(damaged);
+  Header header;
+  header.num_nodes = reader.TakeNumber();
+  header.num_words = reader.TakeNumber();
+  header.direct_level = static_cast<int32_t>(reader.TakeNumber());
+  header.origin_bytes = reader.TakeNumber();
+  return header;
+}
+
+VocabularyTree Decode(std::string_view text, const std::string& name) {
+  Reader reader(text);
+  const Header header = TakeHeader(text, name, reader);
+  if (text.size() < header.num_bytes()) throw InputError(name + kIsTruncated);
+  const size_t num_signed = header.num_bytes() - kDigestBytes;
+  if (text.size() > header.num_bytes() || DigestOf(text.substr(0, num_signed)) != text.substr(num_signed)) {
+    throw InputError(name + kIsDamaged);
   }
   VocabularyTree tree;
-  tree.direct_level = direct_level;
-  tree.origin.resize(origin_bytes);
-  reader.Take(tree.origin.data(), origin_bytes);
-  reader.TakeAll(tree.num_children, num_nodes);
-  reader.TakeAll(tree.centers, num_nodes);
-  reader.TakeAll(tree.idf, num_words);
-  if (!tree.Check().empty()) throw InputError(damaged);
+  tree.direct_level = header.direct_level;
+  tree.origin.resize(header.origin_bytes);
+  reader.Take(tree.origin.data(), header.origin_bytes);
+  reader.TakeAll(tree.num_children, header.num_nodes);
+  reader.TakeAll(tree.centers, header.num_nodes);
+  reader.TakeAll(tree.idf, header.num_words);
+  if (!tree.Check().empty()) throw InputError(name + kIsDamaged);
   return tree;
 }
 
 }  // namespace
 
 std::shared_ptr<const Vocabulary> Vocabulary::Load(const std::string& path) {
-  return std::make_shared<const Vocabulary>(Decode(ReadWhole(path), path));
+  return std::make_shared<const Vocabulary>(Decode(ReadWhole(path), "vocabulary " + path));
 }
 
 void Vocabulary::Save(const std::string& path) const {

@@ -70,7 +70,8 @@ uint64_t Sum(const std::vector<int>& values) { return std::accumulate(values.beg
 std::vector<Descriptor> ChooseCenters(const std::vector<Descriptor>& members, int k, std::mt19937_64& generator) {
   constexpr int kNumDraws = 4;
   std::vector<Descriptor> centers{members[generator() % members.size()]};
-  std::vector<int> squared = Join(members, centers[0], std::vector<int>(members.size(), static_cast<int>(kNumBits * kNumBits)));
+  std::vector<int> squared(members.size(), static_cast<int>(kNumBits * kNumBits));
+  squared = Join(members, centers[0], std::move(squared));
   uint64_t sum = Sum(squared);
   while (centers.size() < static_cast<size_t>(k) && sum > 0) {  // 0: every member is a centre
     Descriptor best{};

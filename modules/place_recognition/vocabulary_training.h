@@ -27,8 +27,8 @@ struct VocabularyOptions {
 //
 // until nothing changes, and each part is split in turn. The first centres are chosen as in k-means++ (Arthur and
 // Vassilvitskii 2007), the best of a few drawn with probabilities proportional to the squared distance from the nearest
-// centre so far. The tree is a pure function of its arguments. images[i]: the descriptors of one image; idf counts the images that hold a
-// word. Throws std::invalid_argument with options.Check()'s sentence, or if there are no descriptors.
+// centre so far. The tree is a pure function of its arguments. images[i]: the descriptors of one image; idf counts the
+// images that hold a word. Throws std::invalid_argument with options.Check()'s sentence, or if there are no descriptors.
 VocabularyTree TrainVocabulary(const std::vector<std::vector<Descriptor>>& images, const VocabularyOptions& options);
 
 }  // namespace tessera

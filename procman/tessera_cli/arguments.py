@@ -168,12 +168,34 @@ def add_look_commands(commands) -> None:
     keep_map.add_argument("--follow", action="store_true", help="write when the run has ended, not at once")
     add_port(keep_map)
     experiment = add_command(commands, "experiment", "experiment", "Measurements, as a table, a CSV file and a plot under logs/.",
-                             "examples:\n  procman/tessera experiment extraction\n")
-    experiment.add_argument("name", metavar="NAME", choices=("extraction",), help="extraction: time per image against cv::ORB")
+                             "examples:\n  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n")
+    experiment.add_argument("name", metavar="NAME", choices=("extraction", "places"),
+                            help="extraction: time per image against cv::ORB; places: recall and precision of place recognition")
+    experiment.add_argument("sources", metavar="SOURCE", nargs="*", help="places: with ground truth, instead of those it has itself")
     spy = add_command(commands, "spy", "spy", "lcm-spy with Tessera's message types.",
                       "examples:\n  procman/tessera spy --bus camera\n")
     spy.add_argument("--bus", choices=("main", "camera", "work"), default="main", help="default main")
     add_port(spy)
+
+
+def add_vocabulary_command(commands) -> None:
+    vocabulary = add_command(commands, "vocabulary", "vocabulary", "Vocabularies of binary words, for the recognition of places.",
+                             "examples:\n  procman/tessera vocabulary train mine.tvoc photos/ kitti:data/kitti/sequences/03\n"
+                             "  procman/tessera vocabulary info config/vocabulary.tvoc\n")
+    actions = vocabulary.add_subparsers(metavar="train|info", required=True, dest="action", parser_class=Parser)
+    train = actions.add_parser("train", help="learns one from images", allow_abbrev=False, epilog=SOURCES,
+                               formatter_class=argparse.RawDescriptionHelpFormatter)
+    train.add_argument("out", metavar="OUT", help="the file to write")
+    train.add_argument("sources", metavar="SOURCE", nargs="+", help="a source that ends, see below, or a folder of photos")
+    train.add_argument("--every", type=whole_number(1, 100000), metavar="N", help="one frame in N of a source, default 10")
+    train.add_argument("--views", type=whole_number(1, 1000), metavar="N", help="views cut out of each photo, default 4")
+    train.add_argument("--camera", metavar="FILE.yaml", help="calibration, where a source brings none")
+    train.add_argument("--features", type=whole_number(1, 100000), metavar="N", help="keypoints per image, default 2000")
+    train.add_argument("--children", type=whole_number(2, 255), metavar="K", help="into which a node is split, default 10")
+    train.add_argument("--levels", type=whole_number(1, 10), metavar="L", help="of the tree, default 5: at most K^L words")
+    train.add_argument("--seed", type=whole_number(0, 999999999), metavar="N", help="another seed, another vocabulary; default 1")
+    info = actions.add_parser("info", help="checks one and tells what is in it", allow_abbrev=False)
+    info.add_argument("path", metavar="FILE")
 
 
 def parse_arguments(arguments: list[str]) -> argparse.Namespace:
@@ -182,4 +204,5 @@ def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     add_demo(commands)
     add_run_commands(commands)
     add_look_commands(commands)
+    add_vocabulary_command(commands)
     return parser.parse_args(arguments)

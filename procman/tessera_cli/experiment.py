@@ -9,8 +9,9 @@ from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
 
-from tessera_cli.errors import RunFailed
+from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BUILD, ROOT, unfinished
+from tessera_cli.places import measure_places
 
 BENCHMARK = BUILD / "tests" / "benchmarks" / "features_benchmark"
 REFERENCE = "CvOrb"
@@ -32,8 +33,11 @@ class Row:
 
 
 def main(arguments: Namespace) -> int:
-    experiments = {"extraction": measure_extraction}
-    return experiments[arguments.name]()
+    if arguments.name == "places":
+        return measure_places(arguments.sources)
+    if arguments.sources:
+        raise UserError("experiment extraction takes no SOURCE: its images are its own.")
+    return measure_extraction()
 
 
 def measure_extraction() -> int:

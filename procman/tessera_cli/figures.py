@@ -18,7 +18,7 @@ def draw_all(results: list[Result]) -> list[Drawing]:
 
 
 def draw_map_growth(results: list[Result]) -> Drawing | None:
-    numbered = numbered_where(results, lambda result: result.frames is not None)
+    numbered = numbered_where(results, lambda result: result.frames is not None and np.isfinite(result.frames.landmarks).any())
     if not numbered:
         return None
     figure = new_figure(*CARD)
@@ -29,7 +29,7 @@ def draw_map_growth(results: list[Result]) -> Drawing | None:
         seconds, made = frames.times_s - start_s(result), np.cumsum(frames.is_keyframe)
         upper.plot(*thin(seconds, made), **style, label=short(result.name))
         lower.plot(*thin(seconds, frames.landmarks / 1000), **style)
-        words.append(f"{result.name}: {made[-1]} keyframes made, {frames.landmarks[-1]:.0f} landmarks at the end")
+        words.append(f"{result.name}: {made[-1]} keyframes made, {np.nanmax(frames.landmarks):.0f} landmarks at most")
     upper.set(ylabel="keyframes", ylim=(0, None))
     lower.set(xlabel="time in the source [s]", ylabel="landmarks [1000]", ylim=(0, None))
     figure.align_ylabels()
@@ -42,7 +42,7 @@ def draw_map_growth(results: list[Result]) -> Drawing | None:
 
 
 def draw_inliers(results: list[Result]) -> Drawing | None:
-    numbered = numbered_where(results, lambda result: result.frames is not None)
+    numbered = numbered_where(results, lambda result: result.frames is not None and np.isfinite(result.frames.inliers).any())
     if not numbered:
         return None
     figure = new_figure(*CARD)

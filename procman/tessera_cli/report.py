@@ -64,6 +64,9 @@ def _tiles(result: Result) -> list[tuple[str, str]]:
              ("frames tracked", _text(summary.get("frames_tracked"), "{:,}") + _text(summary.get("frames"), " of {:,}")),
              ("loops closed", _text(words.num_loops(result), "{:,}")), ("tracking failures", _text(summary.get("tracking_failures"), "{:,}")),
              ("keyframes", _text(summary.get("keyframes"), "{:,}")), ("landmarks", _text(summary.get("landmarks"), "{:,}"))]
+    if error and not summary:
+        tiles += [("greatest error", f"{error.errors_m.max():.3f} m"), ("length of the way", f"{length_m(error.truth):,.1f} m"),
+                  ("poses compared", f"{len(error.errors_m):,}")]
     return [(name, value) for name, value in tiles if NOTHING not in value]
 
 

@@ -138,6 +138,8 @@ class Launcher:
         deadline = time.monotonic() + DRAIN_TIMEOUT_S
         while not self._bus.progress.is_finished and time.monotonic() < deadline:
             self._look(view)
+        if self._bus.progress.num_poses == 0:
+            raise RunFailed("interrupted before the first pose.")
         return "interrupted"
 
     def _look(self, view) -> None:

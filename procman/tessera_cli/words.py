@@ -118,8 +118,8 @@ def _lost(result: Result) -> list[str]:
 def _messages(summary: dict) -> list[str]:
     found = []
     if repaired := summary.get("messages_repaired"):
-        found.append(f"{count(repaired, 'message')} got lost on the way and {'was' if repaired == 1 else 'were'} sent again: "
-                     "a larger receive buffer (procman/tessera setup) avoids it.")
+        found.append(f"{count(repaired, 'message')} got lost on the way and {'was' if repaired == 1 else 'were'} sent again; "
+                     "nothing is missing.")
     if lost := summary.get("messages_lost"):
         found.append(f"{count(lost, 'message')} stayed lost: the run may not be repeatable.")
     if undecodable := summary.get("messages_undecodable"):

@@ -15,6 +15,7 @@
 #include <iostream>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/errors.h"
@@ -148,7 +149,8 @@ struct Curve {
   };
   std::vector<Point> points;  // from the highest threshold down
   double sure_recall = 0.0;   // the highest recall at 100 % precision
-  double sure_threshold = 0.0;
+  double sure_threshold = 0.0;  // the lowest that still has it
+  double best_false = 0.0;      // the highest score of an answer that is not true
 };
 
 // Answers in falling order of their scores; equal ones stand or fall together.
@@ -160,6 +162,7 @@ Curve MakeCurve(std::vector<Answer> answers, double Answer::*score) {
   double num_true = 0.0;
   for (size_t i = 0; i < answers.size(); ++i) {
     num_true += answers[i].is_true ? 1.0 : 0.0;
+    if (!answers[i].is_true) curve.best_false = std::max(curve.best_false, answers[i].*score);
     if (i + 1 < answers.size() && answers[i + 1].*score == answers[i].*score) continue;
     const double threshold = answers[i].*score;
     const double recall = num_to_find > 0 ? num_true / static_cast<double>(num_to_find) : 0.0;
@@ -191,10 +194,12 @@ void Measure(const std::vector<View>& views, const std::string& path, const Argu
   const auto count = [&](bool Answer::*what) {
     return std::count_if(answers.begin(), answers.end(), [&](const Answer& answer) { return answer.*what; });
   };
-  std::printf("%s: views %zu, revisits %td, best place true %td; recall at 100 %% precision %.3f (score/neighbour's > %.3f), "
-              "by the bare score %.3f (> %.4f)\n",
-              path.c_str(), views.size(), count(&Answer::has_truth), count(&Answer::is_true), curve.sure_recall,
-              curve.sure_threshold, raw.sure_recall, raw.sure_threshold);
+  std::printf("%s: views %zu, revisits %td, best place true %td\n", path.c_str(), views.size(), count(&Answer::has_truth),
+              count(&Answer::is_true));
+  for (const auto& [name, of] : {std::pair("score / neighbour's", &curve), std::pair("bare score", &raw)}) {
+    std::printf("  %s: recall at 100 %% precision %.3f down to %.3f; best false answer %.3f\n", name, of->sure_recall,
+                of->sure_threshold, of->best_false);
+  }
   WriteFiles(answers, curve, arguments.out_dir / std::filesystem::path(path).stem());
 }
 
