@@ -13,7 +13,7 @@ namespace tessera {
 
 struct KeyframeDecisionOptions {
   // Of the reference's points that were found in the frame after it, this share must still be seen at the next frame.
-  double min_share = 0.6;
+  double min_share = 0.75;
   // Of all the reference's points, this share must be found in the frame after it. Corners come and go: a loss of a
   // third from frame to frame is nothing to act on, a greater one is motion.
   double min_first_share = 0.4;

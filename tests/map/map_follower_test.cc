@@ -19,7 +19,7 @@ class Owner {
 
   MapFollower::Delta Next() {
     auto delta = std::make_shared<const MapDelta>(RandomChange(map_, generator_));
-    archive_.Add(delta);
+    archive_.Add(delta, map_);
     return delta;
   }
   void Answer(const MapRequest& request, MapFollower& follower) {
