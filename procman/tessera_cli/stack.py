@@ -34,7 +34,7 @@ class Stack:
     def start(self, stage: str, instance: int | None = None) -> None:
         """`instance` numbers the processes of a stage that has several."""
         name = stage if instance is None else f"{stage}_{instance}"
-        command = [str(BIN / f"tessera-{stage}"), "--settings", str(self._settings_path), "--name", name,
+        command = [str(BIN / f"tessera-{stage.replace('_', '-')}"), "--settings", str(self._settings_path), "--name", name,
                    "--id", str(instance or 0)]
         process = StageProcess(name, command, self._log_dir / f"{name}.log")
         try:
