@@ -65,7 +65,9 @@ FrameCounts RunRecord::Counts() const {
     } else {
       ++counts.lost;
     }
-    if (state == TrackingState::kLost && before == TrackingState::kTracked) {
+    // One whose place was asked for and found within the same frame was lost all the same.
+    const bool is_lost = state == TrackingState::kLost || pose.estimate.is_relocalized;
+    if (is_lost && before == TrackingState::kTracked) {
       ++counts.tracking_failures;
     }
     before = state;

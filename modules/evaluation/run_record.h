@@ -39,7 +39,7 @@ struct FrameCounts {
   int64_t initializing = 0;       // without a pose, before the first that has one
   int64_t lost = 0;               // without a pose, after it
   int64_t dropped = 0;            // never reached the tracker
-  int64_t tracking_failures = 0;  // changes from tracked to lost
+  int64_t tracking_failures = 0;  // changes from tracked to lost, also if the same frame was found again
   int64_t relocalizations = 0;    // changes back, into a part of the map that was there before
 };
 

@@ -65,7 +65,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   if (last_ && (last_->frame.view == view || Place(frame))) {
     if (last_->frame.view != view) Remember(std::move(frame));
     pose.num_matches = last_->frame.NumPoints();
-    pose.is_relocalized = was_lost;
+    pose.is_relocalized = was_lost || pose.relocalized_by.valid();
     pose.state = TrackingState::kTracked;
     if (options_.makes_keyframes && IsKeyframeDue()) {
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));

@@ -16,6 +16,9 @@ constexpr const char* kPublisher = "map_file";
 constexpr size_t kMaxMessageBytes = 60000;
 constexpr int32_t kVersion = 1;
 
+// The same map gives the same bytes: no clock in them.
+MessageHeader HeaderOf(int64_t sequence) { return {.publisher = kPublisher, .epoch_us = 1, .sequence = sequence}; }
+
 CameraCalibration CameraOf(const Map& map) {
   CameraCalibration camera;
   bool is_first = true;
@@ -49,11 +52,10 @@ void WriteMapFile(const Map& map, const std::string& path) {
   const int32_t num_pages = NumSnapshotPages(snapshot);
   LogFileWriter file(path);
   const MapFileHeader file_header{kVersion, num_pages, map.keyframes().size(), map.landmarks().size(), CameraOf(map)};
-  file.Write(0, kHeaderChannel, EncodeValue(file_header, {.publisher = kPublisher}, kMaxMessageBytes).front());
+  file.Write(0, kHeaderChannel, EncodeValue(file_header, HeaderOf(0), kMaxMessageBytes).front());
   int64_t sequence = 1;
   for (int32_t page = 0; page < num_pages; ++page) {
-    const MessageHeader header{.publisher = kPublisher, .sequence = sequence};
-    for (const Bytes& message : EncodeValue(CutSnapshotPage(snapshot, page), header, kMaxMessageBytes)) {
+    for (const Bytes& message : EncodeValue(CutSnapshotPage(snapshot, page), HeaderOf(sequence), kMaxMessageBytes)) {
       file.Write(sequence++, kMapSnapshotChannel.name, message);
     }
   }
