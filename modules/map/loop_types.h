@@ -53,6 +53,7 @@ struct GlobalAdjustment {
   };
 
   KeyframeId answers;
+  int64_t delta = -1;          // number of that delta: at the end of a run several answer the last keyframe
   bool is_usable = false;      // false: the solver found nothing better
   std::vector<Pose> poses;     // by id
   std::vector<Point> points;   // by id

@@ -1,6 +1,5 @@
 #include "optimization/global_adjustment.h"
 
-#include <cstdio>
 #include <stdexcept>
 
 #include "map/spanning_tree.h"
@@ -27,11 +26,11 @@ GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOp
   if (map.FindKeyframe(asked) == nullptr) throw std::invalid_argument("the keyframe to be adjusted is not in the map");
   GlobalAdjustment adjustment;
   adjustment.answers = asked;
+  adjustment.delta = map.next_delta() - 1;
   const LocalWindow part = WholePart(map, RootOf(map, asked));
   if (part.inner.size() < 2 || part.landmarks.empty()) return adjustment;
   const BundleProblem problem = BuildLocalProblem(map, part, {});
   const std::optional<BundleResult> result = AdjustBundle(problem, options);
-  if (result) std::fprintf(stderr, "GBA %zu poses %zu points %zu obs cost %g -> %g, %d iterations, inliers %d\n", problem.poses.size(), problem.points.size(), problem.observations.size(), result->initial_cost, result->final_cost, result->num_iterations, result->num_inliers);
   if (!result || !(result->final_cost < result->initial_cost)) return adjustment;
   adjustment.is_usable = true;
   for (size_t i = 0; i < problem.poses.size(); ++i) {

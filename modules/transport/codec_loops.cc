@@ -126,6 +126,7 @@ struct Codec<GlobalAdjustment> {
   template <class Emit>
   static void Cut(const GlobalAdjustment& adjustment, Message* message, size_t max_bytes, Emit emit) {
     message->keyframe = adjustment.answers.value;
+    message->delta = adjustment.delta;
     message->is_usable = adjustment.is_usable ? 1 : 0;
     const size_t overhead = static_cast<size_t>(message->getEncodedSize());
     Dealer poses(adjustment.poses);
@@ -154,9 +155,12 @@ struct Codec<GlobalAdjustment> {
     if (message.header.part == 0) {
       *adjustment = {};
       adjustment->answers.value = message.keyframe;
+      adjustment->delta = message.delta;
       adjustment->is_usable = message.is_usable != 0;
     }
-    if (message.keyframe < 0 || message.keyframe != adjustment->answers.value) return "its keyframe is out of range";
+    if (message.keyframe < 0 || message.keyframe != adjustment->answers.value || message.delta < 0) {
+      return "its keyframe or delta is out of range";
+    }
     for (size_t i = 0; i < static_cast<size_t>(message.num_poses); ++i) {
       GlobalAdjustment::Pose& pose = adjustment->poses.emplace_back();
       pose.id.value = message.poses[i].keyframe;

@@ -101,13 +101,9 @@ class Mapping {
       LoopResult result = Measure(run_.loop_ms, [&] { return run_.loop_closer->FindLoop(keyframe.id); });
       schedule_.Receive(result);
       if (result.matched.valid()) {
-        std::fprintf(stderr, "keyframe %ld sees keyframe %ld again: %zu points, scale %.4f, shift %.2f\n",
+        std::fprintf(stderr, "keyframe %ld sees keyframe %ld again: %zu points, scale %.4f\n",
                      static_cast<long>(result.answers.value), static_cast<long>(result.matched.value),
-                     result.seen.size(), result.matched_from_current.scale,
-                     (result.corrections.back().new_world_from_old *
-                          run_.mapper.map().FindKeyframe(result.corrections.back().id)->world_from_camera.translation -
-                      run_.mapper.map().FindKeyframe(result.corrections.back().id)->world_from_camera.translation)
-                         .norm());
+                     result.seen.size(), result.matched_from_current.scale);
       }
       result.corrections.clear();
       run_.loops.push_back(std::move(result));
@@ -125,15 +121,9 @@ class Mapping {
     if (!run_.loop_closer) return;
     if (const std::string problem = run_.loop_closer->ApplyDelta(delta); !problem.empty()) throw InputError(problem);
     if (!delta.asks_adjustment) return;
-    schedule_.Ask(delta.answers);
+    schedule_.Ask(delta.answers, delta.number);
     schedule_.Receive(Measure(run_.adjust_ms, [&] {
-      BundleOptions o = GlobalBundleOptions();
-      if (const char* e = getenv("GBA_ITER")) o.max_num_iterations = std::atoi(e);
-      if (const char* e = getenv("GBA_ROUNDS")) o.num_rounds = std::atoi(e);
-      if (const char* e = getenv("GBA_TOL")) o.function_tolerance = std::atof(e);
-      GlobalAdjustment a = AdjustGlobally(run_.mapper.map(), delta.answers, o);
-      if (getenv("GBA_OFF")) a.is_usable = false;
-      return a;
+      return AdjustGlobally(run_.mapper.map(), delta.answers, GlobalBundleOptions());
     }));
   }
 

@@ -25,7 +25,6 @@ struct Arguments {
   int64_t map_delay_frames = 3;
   bool is_mirrored = false;
   std::string vocabulary;
-  MapTrackerOptions tracker;
 };
 
 Arguments ParseArguments(int argc, char** argv) {
@@ -39,20 +38,11 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.vocabulary = text.substr(key.size() + 1);
       continue;
     }
-    if (key == "share") {
-      arguments.tracker.keyframes.min_share = std::stod(text.substr(key.size() + 1));
-      continue;
-    }
-    if (key == "parallax") {
-      arguments.tracker.keyframes.min_parallax_rad = std::stod(text.substr(key.size() + 1));
-      continue;
-    }
     const int64_t value = std::stoll(text.substr(key.size() + 1));
     if (key == "first") arguments.source.first_frame = value;
     else if (key == "last") arguments.source.last_frame = value;
     else if (key == "delay") arguments.map_delay_frames = value;
     else if (key == "features") arguments.features.num_features = static_cast<int>(value);
-    else if (key == "interval_us") arguments.tracker.keyframes.max_interval_us = value;
     else if (key == "mirror") arguments.is_mirrored = value != 0;
     else throw InputError("unknown argument `" + key + "`");
   }
@@ -139,7 +129,7 @@ int main(int argc, char** argv) {
       run.loop_closer = std::make_unique<tessera::LoopCloser>(tessera::Vocabulary::Load(arguments.vocabulary),
                                                               tessera::LoopCloserOptions{});
     }
-    tessera::Play(sequence.frames, arguments.tracker, arguments.map_delay_frames, run);
+    tessera::Play(sequence.frames, tessera::MapTrackerOptions{}, arguments.map_delay_frames, run);
     tessera::Report(sequence, run);
     tessera::WriteFiles(sequence, run, argv[3]);
   } catch (const std::exception& error) {

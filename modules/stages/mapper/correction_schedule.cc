@@ -9,7 +9,7 @@ void CorrectionSchedule::Receive(const LoopResult& result) {
 }
 
 void CorrectionSchedule::Receive(const GlobalAdjustment& adjustment) {
-  adjustments_.try_emplace(adjustment.answers, adjustment);
+  adjustments_.try_emplace(adjustment.delta, adjustment);
 }
 
 // Results of next_loop_ .. id are there. Keyframes count without gaps.
@@ -21,11 +21,11 @@ bool CorrectionSchedule::HasLoopsUpTo(KeyframeId id) const {
 }
 
 bool CorrectionSchedule::IsAdjustmentDue(KeyframeId id) const {
-  return asked_ && id.value >= asked_->value + delays_.adjustment_keyframes;
+  return asked_ && id.value >= asked_->keyframe.value + delays_.adjustment_keyframes;
 }
 
 bool CorrectionSchedule::CanProcess(KeyframeId id) const {
-  const bool has_adjustment = !IsAdjustmentDue(id) || adjustments_.contains(*asked_);
+  const bool has_adjustment = !IsAdjustmentDue(id) || adjustments_.contains(asked_->delta);
   return has_adjustment && HasLoopsUpTo({id.value - delays_.loop_keyframes});
 }
 
@@ -34,7 +34,7 @@ DueCorrections CorrectionSchedule::Take(KeyframeId id) {
 }
 
 bool CorrectionSchedule::CanFinish(KeyframeId last) const {
-  return HasLoopsUpTo(last) && (!asked_ || adjustments_.contains(*asked_));
+  return HasLoopsUpTo(last) && (!asked_ || adjustments_.contains(asked_->delta));
 }
 
 DueCorrections CorrectionSchedule::TakeAll(KeyframeId last) { return TakeUpTo(last, asked_.has_value()); }
@@ -46,8 +46,8 @@ DueCorrections CorrectionSchedule::TakeUpTo(KeyframeId last_loop, bool takes_adj
     if (it->second.matched.valid()) due.loops.push_back(std::move(it->second));
   }
   if (takes_adjustment) {
-    due.adjustment = std::move(adjustments_.at(*asked_));
-    adjustments_.clear();
+    due.adjustment = std::move(adjustments_.at(asked_->delta));
+    adjustments_.erase(adjustments_.begin(), adjustments_.upper_bound(asked_->delta));
     asked_.reset();
   }
   return due;

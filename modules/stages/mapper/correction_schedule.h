@@ -31,8 +31,8 @@ class CorrectionSchedule {
   // In any order; what came before, or is too old, changes nothing.
   void Receive(const LoopResult& result);
   void Receive(const GlobalAdjustment& adjustment);
-  // The map after the delta that answers `asked` is being adjusted; one adjustment at a time.
-  void Ask(KeyframeId asked) { asked_ = asked; }
+  // The map after this delta, which answers `asked`, is being adjusted; one adjustment at a time.
+  void Ask(KeyframeId asked, int64_t delta) { asked_ = Asked{asked, delta}; }
 
   // Whether all is there that must be applied before keyframe `id`.
   bool CanProcess(KeyframeId id) const;
@@ -46,6 +46,10 @@ class CorrectionSchedule {
   bool is_asked() const { return asked_.has_value(); }
 
  private:
+  struct Asked {
+    KeyframeId keyframe;
+    int64_t delta = -1;
+  };
   bool HasLoopsUpTo(KeyframeId id) const;
   bool IsAdjustmentDue(KeyframeId id) const;
   DueCorrections TakeUpTo(KeyframeId last_loop, bool takes_adjustment);
@@ -53,8 +57,8 @@ class CorrectionSchedule {
   CorrectionDelays delays_;
   KeyframeId next_loop_{0};
   std::map<KeyframeId, LoopResult> loops_;
-  std::optional<KeyframeId> asked_;
-  std::map<KeyframeId, GlobalAdjustment> adjustments_;
+  std::optional<Asked> asked_;
+  std::map<int64_t, GlobalAdjustment> adjustments_;  // by delta
 };
 
 }  // namespace tessera

@@ -87,7 +87,10 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
 std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
   MapEditor editor(map_);
   const KeyframeId last = map_.answered();
-  if (!Bend(due, {last.value + 1}, editor) && !wants_adjustment_) return std::nullopt;
+  const bool is_bent = Bend(due, {last.value + 1}, editor);
+  // What came into the map since the last adjustment began shall share in one, where loops hold the map together.
+  wants_adjustment_ |= last_asked_.valid() && last_asked_ < last;
+  if (!is_bent && !wants_adjustment_) return std::nullopt;
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(last);
   delta.asks_adjustment = AskForAdjustment(last);
@@ -123,6 +126,7 @@ bool Mapper::Bend(const DueCorrections& due, KeyframeId now, MapEditor& editor) 
 bool Mapper::AskForAdjustment(KeyframeId now) {
   if (!wants_adjustment_ || base_) return false;
   base_ = TakeBase(map_, now);
+  last_asked_ = now;
   wants_adjustment_ = is_base_bent_ = false;
   return true;
 }

@@ -43,7 +43,8 @@ class Mapper {
   // was given so far; it asks for a global adjustment after a loop was closed, if none is on its way. Throws
   // std::invalid_argument if the id is not new or the lists do not fit the keypoints.
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
-  // Bends the map as is due when no further keyframe will come. nullopt if nothing changes.
+  // Bends the map as is due when no further keyframe will come; after loops, a last adjustment of all is asked for. nullopt
+  // if nothing changes: then there is nothing more to come.
   std::optional<MapDelta> Finish(const DueCorrections& due);
 
   const Map& map() const { return map_; }
@@ -68,6 +69,7 @@ class Mapper {
   KeyframeId last_bent_;        // the map was bent in the delta that answers it
   bool wants_adjustment_ = false;  // a loop was closed that no adjustment has taken in yet
   std::optional<AdjustmentBase> base_;  // of the one under way
+  KeyframeId last_asked_;       // the last delta that asked for an adjustment answers it
   bool is_base_bent_ = false;   // a loop was closed since: it comes too late
   int64_t num_void_loops_ = 0;
 };

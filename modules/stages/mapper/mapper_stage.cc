@@ -113,7 +113,7 @@ void MapperStage::ProcessWaiting() {
 }
 
 void MapperStage::Publish(MapDelta&& delta) {
-  if (delta.asks_adjustment) schedule_.Ask(delta.answers);
+  if (delta.asks_adjustment) schedule_.Ask(delta.answers, delta.number);
   const auto shared = std::make_shared<const MapDelta>(std::move(delta));
   archive_.Add(shared, mapper_.map());
   deltas_.Publish(*shared);
