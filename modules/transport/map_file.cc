@@ -33,9 +33,26 @@ CameraCalibration CameraOf(const Map& map) {
   throw InputError("map file " + path + " " + problem);
 }
 
+// The next event; false at the end. A map's user knows nothing of logs, so their reader's words are put otherwise.
+bool NextEvent(LogFileReader& file, const std::string& path, LogEvent* event) {
+  try {
+    return file.Next(event);
+  } catch (const InputError&) {
+    Refuse(path, "is cut off or damaged: copy it again, or make the map again");
+  }
+}
+
+LogFileReader OpenMapFile(const std::string& path) {
+  try {
+    return LogFileReader(path);
+  } catch (const InputError&) {
+    Refuse(path, "can't be read, or is no map: give the map.tessera of a run, or a file that --save-map wrote");
+  }
+}
+
 MapFileHeader ReadFileHeader(LogFileReader& file, const std::string& path) {
   LogEvent event;
-  if (!file.Next(&event) || event.channel != kHeaderChannel) Refuse(path, "is no map: it does not begin like one");
+  if (!NextEvent(file, path, &event) || event.channel != kHeaderChannel) Refuse(path, "is no map: it does not begin like one");
   ValueJoiner<MapFileHeader> joiner;
   const auto header = ReadHeader(event.data);
   if (!header || joiner.Add(event.data, *header) != ValueJoiner<MapFileHeader>::Result::kComplete ||
@@ -63,12 +80,12 @@ void WriteMapFile(const Map& map, const std::string& path) {
 }
 
 MapDelta ReadMapFile(const std::string& path) {
-  LogFileReader file(path);
+  LogFileReader file = OpenMapFile(path);
   const MapFileHeader header = ReadFileHeader(file, path);
   ValueJoiner<MapSnapshotPage> joiner;
   MapDelta snapshot;
   int32_t num_pages = 0;
-  for (LogEvent event; file.Next(&event);) {
+  for (LogEvent event; NextEvent(file, path, &event);) {
     const auto message_header = ReadHeader(event.data);
     using Result = ValueJoiner<MapSnapshotPage>::Result;
     const Result result = message_header ? joiner.Add(event.data, *message_header) : Result::kRefused;

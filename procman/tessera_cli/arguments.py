@@ -169,9 +169,10 @@ def add_look_commands(commands) -> None:
     add_port(keep_map)
     experiment = add_command(commands, "experiment", "experiment", "Measurements, as a table, a CSV file and a plot under logs/.",
                              "examples:\n  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n")
-    experiment.add_argument("name", metavar="NAME", choices=("extraction", "places"),
-                            help="extraction: time per image against cv::ORB; places: recall and precision of place recognition")
-    experiment.add_argument("sources", metavar="SOURCE", nargs="*", help="places: with ground truth, instead of those it has itself")
+    experiment.add_argument("name", metavar="NAME", choices=("extraction", "places", "worlds"),
+                            help="extraction: time per image against cv::ORB; places: recall and precision of place recognition; "
+                            "worlds: how hard made and recorded sequences are")
+    experiment.add_argument("sources", metavar="SOURCE", nargs="*", help="places, worlds: with ground truth, instead of those it has itself")
     spy = add_command(commands, "spy", "spy", "lcm-spy with Tessera's message types.",
                       "examples:\n  procman/tessera spy --bus camera\n")
     spy.add_argument("--bus", choices=("main", "camera", "work"), default="main", help="default main")

@@ -12,6 +12,7 @@ from pathlib import Path
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BUILD, ROOT, unfinished
 from tessera_cli.places import measure_places
+from tessera_cli.worlds import measure_worlds
 
 BENCHMARK = BUILD / "tests" / "benchmarks" / "features_benchmark"
 REFERENCE = "CvOrb"
@@ -35,6 +36,8 @@ class Row:
 def main(arguments: Namespace) -> int:
     if arguments.name == "places":
         return measure_places(arguments.sources)
+    if arguments.name == "worlds":
+        return measure_worlds(arguments.sources)
     if arguments.sources:
         raise UserError("experiment extraction takes no SOURCE: its images are its own.")
     return measure_extraction()

@@ -26,11 +26,13 @@ auto Measure(std::vector<double>& ms, Step step) {
 }
 
 FeatureFrame ExtractFrame(const CameraFrame& frame, const CameraCalibration& calibration, const FeatureOptions& options,
-                          Extractor& extractor) {
+                          Extractor& extractor, int64_t* num_corners) {
   std::vector<TileFeatures> tiles;
   for (const TileJob& job : CutFrame(frame, calibration, 0, TileGrid{1, 1}, kMaxLevels, options)) {
     tiles.push_back(extractor.Extract(job));
   }
+  *num_corners = 0;
+  for (const TileFeatures& tile : tiles) *num_corners += static_cast<int64_t>(tile.candidates.size());
   return SelectFeatures(tiles);
 }
 
@@ -50,7 +52,7 @@ Rigid3 Mirrored(const Rigid3& pose) {
 FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptions& feature_options,
                                 bool is_mirrored) {
   const auto source = OpenSource(options);
-  FeatureSequence sequence{source->calibration(), {}, source->ground_truth(), {}};
+  FeatureSequence sequence{source->calibration(), {}, source->ground_truth(), {}, {}};
   if (is_mirrored) {
     if (options.sensor != SensorType::kMono) throw InputError("only mono sequences can be mirrored");
     sequence.calibration.cx_px = sequence.calibration.width_px - 1 - sequence.calibration.cx_px;
@@ -59,8 +61,9 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
   Extractor extractor;
   while (auto frame = source->Next()) {
     if (is_mirrored) MirrorImage(frame->left);
+    int64_t& num_corners = sequence.num_corners.emplace_back();
     sequence.frames.push_back(Measure(sequence.extract_ms, [&] {
-      return ExtractFrame(*frame, sequence.calibration, feature_options, extractor);
+      return ExtractFrame(*frame, sequence.calibration, feature_options, extractor, &num_corners);
     }));
   }
   return sequence;

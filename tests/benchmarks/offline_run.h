@@ -21,6 +21,7 @@ struct FeatureSequence {
   std::vector<FeatureFrame> frames;
   std::vector<GroundTruthPose> ground_truth;
   std::vector<double> extract_ms;  // CPU time by frame
+  std::vector<int64_t> num_corners;  // by frame: candidates before the selection
 };
 
 // Reads and extracts. `is_mirrored` (mono only) swaps left and right in images and truth: a sequence of its own, equally

@@ -4,7 +4,7 @@
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
-// OUT_DIR gets trajectory.txt (after all optimisation), trajectory_live.txt and ground_truth.txt, TUM rows each.
+// OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimisation), trajectory_live.txt and ground_truth.txt, TUM rows each.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -82,6 +82,33 @@ void WriteFiles(const FeatureSequence& sequence, const OfflineRun& run, const st
   }
 }
 
+// What tells how hard a sequence is, one row under its names.
+void WriteFigures(const FeatureSequence& sequence, const OfflineRun& run, const std::filesystem::path& out_dir) {
+  const auto mean = [](const auto& values, auto number_of) {
+    double sum = 0.0;
+    for (const auto& value : values) sum += static_cast<double>(number_of(value));
+    return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+  };
+  const Map& map = run.mapper.map();
+  double num_observations = 0.0, length_m = 0.0;
+  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
+    num_observations += static_cast<double>(map.ObservationsOf(id).size());
+  });
+  for (size_t i = 1; i < sequence.ground_truth.size(); ++i) {
+    if (sequence.ground_truth[i].frame > sequence.frames.back().frame) break;
+    length_m += (sequence.ground_truth[i].world_from_camera.translation -
+                 sequence.ground_truth[i - 1].world_from_camera.translation).norm();
+  }
+  const bool is_mono = sequence.calibration.sensor == SensorType::kMono;
+  const double rms_m = RmsError(run.Optimized(), sequence.ground_truth, is_mono).value_or(-1.0);
+  std::ofstream file(out_dir / "figures.csv");
+  file << "frames,lost,corners_per_image,matches_per_frame,observations_per_landmark,loops,length_m,rms_m\n"
+       << run.poses.size() << ',' << run.num_lost << ',' << mean(sequence.num_corners, [](int64_t n) { return n; }) << ','
+       << mean(run.poses, [](const PoseEstimate& pose) { return pose.num_inliers; }) << ','
+       << num_observations / std::max(1.0, static_cast<double>(map.landmarks().size())) << ','
+       << map.closed_loops().size() << ',' << length_m << ',' << rms_m << '\n';
+}
+
 void Report(const FeatureSequence& sequence, const OfflineRun& run) {
   const bool is_mono = sequence.calibration.sensor == SensorType::kMono;
   const std::map<FrameId, Rigid3> optimized = run.Optimized();
@@ -132,6 +159,7 @@ int main(int argc, char** argv) {
     tessera::Play(sequence.frames, tessera::MapTrackerOptions{}, arguments.map_delay_frames, run);
     tessera::Report(sequence, run);
     tessera::WriteFiles(sequence, run, argv[3]);
+    tessera::WriteFigures(sequence, run, argv[3]);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 2;
