@@ -1,0 +1,111 @@
+"""Losing the camera and finding it again, and maps that outlive their run: the real processes on a made sequence."""
+
+import csv
+import shutil
+from pathlib import Path
+
+import pytest
+
+from conftest import NUM_FRAMES, ROOT
+from synthetic_sequence import HEIGHT_PX, WIDTH_PX
+
+BLACK = f"P5 {WIDTH_PX} {HEIGHT_PX} 255\n".encode() + bytes(WIDTH_PX * HEIGHT_PX)
+# The lost camera is black for 2 s, long enough for a new part of the map to be begun if nothing were recognised.
+NUM_BLACK = 40
+
+
+def rearrange(sequence: Path, folder: Path, frames: list[int | None]) -> Path:
+    """A sequence of these frames of another one; None: a black image."""
+    shutil.copytree(sequence, folder, ignore=shutil.ignore_patterns("image_*", "times.txt", "poses.txt"))
+    poses = (sequence / "poses.txt").read_text().splitlines()
+    for camera in ("image_0", "image_1"):
+        (folder / camera).mkdir()
+        for number, frame in enumerate(frames):
+            path = folder / camera / f"{number:06d}.pgm"
+            if frame is None:
+                path.write_bytes(BLACK)
+            else:
+                shutil.copy(sequence / camera / f"{frame:06d}.pgm", path)
+    (folder / "times.txt").write_text("".join(f"{0.05 * number:.6f}\n" for number in range(len(frames))))
+    (folder / "poses.txt").write_text("".join(poses[frame or 0] + "\n" for frame in frames))
+    return folder
+
+
+def states(run) -> list[str]:
+    with open(run.folder / "frames.csv", newline="") as file:
+        return [row["state"] for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("sensor", ["mono", "stereo"])
+def test_a_camera_that_saw_nothing_is_found_where_it_was_before(tessera, sequence, tmp_path, sensor):
+    frames = [*range(NUM_FRAMES), *[None] * NUM_BLACK, *range(20, 40)]
+    blinded = rearrange(sequence, tmp_path / "blinded", frames)
+    run = tessera.run(f"kitti:{blinded}", "--sensor", sensor).must_end_well()
+    first_seen = NUM_FRAMES + NUM_BLACK
+    assert states(run)[NUM_FRAMES:first_seen] == ["lost"] * NUM_BLACK
+    assert set(states(run)[first_seen:]) == {"tracked"}  # from the first image on
+    assert run.summary["tracking_failures"] == run.summary["relocalizations"] == 1
+    assert run.summary["frames_lost"] == NUM_BLACK
+    assert run.summary["rms_error_m"] < 0.05
+
+
+def test_a_camera_that_was_carried_back_goes_on_in_the_same_map(tessera, sequence, tmp_path):
+    jumping = rearrange(sequence, tmp_path / "jumping", [*range(NUM_FRAMES), *range(5, 25)])
+    run = tessera.run(f"kitti:{jumping}", "--sensor", "stereo").must_end_well()
+    assert run.summary["frames_lost"] == 0
+    assert run.summary["tracking_failures"] == run.summary["relocalizations"] <= 1  # a small room: it may never be lost
+    assert run.summary["rms_error_m"] < 0.05
+
+
+@pytest.fixture(scope="module")
+def saved(tessera, sequence, tmp_path_factory):
+    """A run and the map that it saved."""
+    path = tmp_path_factory.mktemp("maps") / "room.tessera"
+    run = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--save-map", path).must_end_well()
+    assert path.read_bytes() == (run.folder / "map.tessera").read_bytes()
+    return run, path
+
+
+def test_a_saved_map_places_every_frame_of_another_run(tessera, sequence, saved):
+    run, path = saved
+    localized = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--localize-only").must_end_well()
+    assert set(states(localized)) == {"tracked"}
+    assert localized.summary["map_sha256"] == run.summary["map_sha256"]
+    assert localized.summary["rms_error_m"] < max(0.005, 1.2 * run.summary["rms_error_m"])
+
+
+def test_a_saved_map_is_continued_and_again_the_same_each_time(tessera, sequence, saved):
+    run, path = saved
+    continued = [tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--extractors", number).must_end_well()
+                 for number in (1, 3)]
+    assert continued[0].summary["keyframes"] > run.summary["keyframes"]
+    assert continued[0].summary["frames_tracked"] == NUM_FRAMES
+    for key in ("trajectory_sha256", "map_sha256"):
+        assert continued[0].summary[key] == continued[1].summary[key]
+
+
+def test_a_broken_map_file_is_refused_in_one_sentence(tessera, sequence, saved, tmp_path):
+    _, path = saved
+    whole = path.read_bytes()
+    cut = tmp_path / "cut.tessera"
+    for tenth in (0, 3, 9):
+        cut.write_bytes(whole[:len(whole) * tenth // 10])
+        finished = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--load-map", cut)
+        assert finished.status == 2 and str(cut) in finished.err and "Traceback" not in finished.err
+    finished = tessera.run(f"kitti:{sequence}", "--sensor", "mono", "--load-map", path)
+    assert finished.status == 2 and "another camera or sensor" in finished.err
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (["--load-map", "/no/such/map"], "there is no file"),
+    (["--save-map", "/no/such/folder/map"], "there is no folder"),
+    (["--localize-only"], "needs a map"),
+    (["--set", "tracker.localize_only=true"], "--localize-only"),
+])
+def test_wrong_arguments_about_maps(tessera, sequence, arguments, words):
+    finished = tessera.run(f"kitti:{sequence}", *arguments)
+    assert finished.status == 2 and words in finished.err
+
+
+def test_the_vocabulary_is_part_of_the_project():
+    assert (ROOT / "config" / "vocabulary.tvoc").stat().st_size < 8_000_000
