@@ -32,6 +32,11 @@ void ForEachValueType(Visit visit) {
   visit.template operator()<MapDelta>();
   visit.template operator()<MapSnapshotPage>();
   visit.template operator()<MapRequest>();
+  visit.template operator()<MapFileHeader>();
+  visit.template operator()<LoopResult>();
+  visit.template operator()<GlobalAdjustment>();
+  visit.template operator()<RelocalizationRequest>();
+  visit.template operator()<RelocalizationAnswer>();
   visit.template operator()<PoseEstimate>();
   visit.template operator()<StageStatus>();
   visit.template operator()<Heartbeat>();
