@@ -10,6 +10,7 @@
 namespace tessera {
 namespace {
 
+constexpr int64_t kFirstDelta = 100;  // of the delta that answers keyframe 0
 constexpr CorrectionDelays kDelays{.loop_keyframes = 3, .adjustment_keyframes = 5};
 
 // Keyframes 4, 11, 18, ... close a loop; the others don't.
@@ -23,6 +24,7 @@ LoopResult ResultOf(int64_t keyframe) {
 GlobalAdjustment AdjustmentOf(int64_t keyframe) {
   GlobalAdjustment adjustment;
   adjustment.answers = {keyframe};
+  adjustment.delta = keyframe + kFirstDelta;
   return adjustment;
 }
 
@@ -36,9 +38,9 @@ std::string Describe(int64_t keyframe, const DueCorrections& due) {
 
 // A mapper that asks for an adjustment when it closed a loop and none is on its way, and gets answers whenever `deliver`
 // is called; those of keyframes that it has not processed yet may come too (from before it was started again).
-class Run {
+class MapperRun {
  public:
-  explicit Run(int64_t num_keyframes) : num_keyframes_(num_keyframes) {}
+  explicit MapperRun(int64_t num_keyframes) : num_keyframes_(num_keyframes) {}
 
   template <class Deliver>
   std::string Go(Deliver deliver) {
@@ -58,7 +60,7 @@ class Run {
   void Note(int64_t k, const DueCorrections& due) {
     wants_ |= !due.loops.empty();
     if (!wants_ || schedule_.is_asked()) return;
-    schedule_.Ask({k});
+    schedule_.Ask({k}, k + kFirstDelta);
     wants_ = false;
   }
 
@@ -74,7 +76,7 @@ std::string InRandomOrder(int64_t num_keyframes, unsigned seed) {
   for (int64_t i = 0; i < 4 * num_keyframes; ++i) messages.push_back(i / 2);
   std::shuffle(messages.begin(), messages.end(), generator);
   size_t next = 0;
-  return Run(num_keyframes).Go([&](CorrectionSchedule& schedule, int64_t) {
+  return MapperRun(num_keyframes).Go([&](CorrectionSchedule& schedule, int64_t) {
     const int64_t message = messages.at(next++);
     if (message % 2 == 0) {
       schedule.Receive(ResultOf(message / 2));
@@ -88,7 +90,7 @@ TEST(CorrectionSchedule, WhatIsDueWhenDoesNotDependOnArrival) {
   const int64_t num_keyframes = 60;
   // As late as can be: what is missing comes when it is waited for, one keyframe's at a time.
   int64_t sent = 0;
-  const std::string lazy = Run(num_keyframes).Go([&](CorrectionSchedule& schedule, int64_t k) {
+  const std::string lazy = MapperRun(num_keyframes).Go([&](CorrectionSchedule& schedule, int64_t k) {
     if (sent <= k - kDelays.loop_keyframes || k == num_keyframes) {
       schedule.Receive(ResultOf(sent++));
     }
@@ -130,7 +132,7 @@ TEST(CorrectionSchedule, AnAdjustmentIsDueExactlyAfterItsDelay) {
   }
   schedule.Receive(AdjustmentOf(10));  // nobody asked yet
   (void)schedule.Take({10});
-  schedule.Ask({10});
+  schedule.Ask({10}, 10 + kFirstDelta);
   EXPECT_TRUE(schedule.is_asked());
   for (int64_t k = 11; k < 15; ++k) {
     ASSERT_TRUE(schedule.CanProcess({k}));
@@ -138,7 +140,7 @@ TEST(CorrectionSchedule, AnAdjustmentIsDueExactlyAfterItsDelay) {
   }
   EXPECT_TRUE(schedule.Take({15}).adjustment.has_value());
   EXPECT_FALSE(schedule.is_asked());
-  schedule.Ask({15});
+  schedule.Ask({15}, 15 + kFirstDelta);
   EXPECT_TRUE(schedule.CanProcess({19}));
   EXPECT_FALSE(schedule.CanProcess({20})) << "an adjustment for keyframe 15 is missing";
   schedule.Receive(AdjustmentOf(14));
@@ -153,7 +155,7 @@ TEST(CorrectionSchedule, LaterAdjustmentsSurviveTheTakingOfEarlierOnes) {
   for (int64_t k = 0; k < 30; ++k) schedule.Receive(ResultOf(k));
   for (const int64_t k : {7, 14, 21}) schedule.Receive(AdjustmentOf(k));
   for (const int64_t asked : {7, 14, 21}) {
-    schedule.Ask({asked});
+    schedule.Ask({asked}, asked + kFirstDelta);
     ASSERT_TRUE(schedule.CanProcess({asked + 5})) << asked;
     EXPECT_EQ(schedule.Take({asked + 5}).adjustment.value().answers, KeyframeId{asked});
   }
@@ -163,7 +165,7 @@ TEST(CorrectionSchedule, AtTheEndEverythingIsDue) {
   CorrectionSchedule schedule(kDelays);
   for (int64_t k = 0; k < 11; ++k) schedule.Receive(ResultOf(k));
   (void)schedule.Take({10});
-  schedule.Ask({10});
+  schedule.Ask({10}, 10 + kFirstDelta);
   EXPECT_FALSE(schedule.CanFinish({11}));
   schedule.Receive(AdjustmentOf(10));
   EXPECT_FALSE(schedule.CanFinish({11})) << "the last keyframe's result is missing";
@@ -175,6 +177,23 @@ TEST(CorrectionSchedule, AtTheEndEverythingIsDue) {
   EXPECT_TRUE(due.adjustment.has_value());
   EXPECT_TRUE(schedule.CanFinish({11})) << "nothing is left to wait for";
   EXPECT_TRUE(schedule.TakeAll({11}).loops.empty());
+}
+
+// At the end of a run several deltas answer the last keyframe.
+TEST(CorrectionSchedule, AdjustmentsOfOneKeyframeAreToldApart) {
+  CorrectionSchedule schedule(kDelays);
+  for (int64_t k = 0; k < 4; ++k) schedule.Receive(ResultOf(k));
+  GlobalAdjustment first = AdjustmentOf(3), second = first;
+  ++second.delta;
+  second.is_usable = true;
+  schedule.Receive(first);
+  schedule.Receive(second);
+  schedule.Ask({3}, first.delta);
+  ASSERT_TRUE(schedule.CanFinish({3}));
+  EXPECT_FALSE(schedule.TakeAll({3}).adjustment.value().is_usable);
+  schedule.Ask({3}, second.delta);
+  ASSERT_TRUE(schedule.CanFinish({3}));
+  EXPECT_TRUE(schedule.TakeAll({3}).adjustment.value().is_usable);
 }
 
 TEST(CorrectionSchedule, KeyframesOfALoadedMapHaveNoResults) {

@@ -140,7 +140,7 @@ TEST_F(LoopMapper, AnAdjustmentThatComesAfterAnotherLoopIsVoidAndAskedForAnew) {
     nonsense.poses.push_back({id, Rigid3{Eigen::Quaterniond::Identity(), {0, 50, 0}} * keyframe.world_from_camera});
   });
   Step();
-  const LoopResult second = LoopAt({14}, {4});
+  const LoopResult second = LoopAt({14}, {5});
   Step({{second}, {}});
   EXPECT_FALSE(delta_.asks_adjustment) << "the first one is still on its way";
   EXPECT_EQ(mapper_.map().closed_loops().size(), 2U);

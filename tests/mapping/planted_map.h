@@ -3,7 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -19,10 +21,13 @@ class PlantedMap {
 
   // The next keyframe takes a picture at a step of the world. The map holds it, and the points that no keyframe of this
   // visit has seen yet, where `map_from_truth` puts them: two visits know the same points under different names.
-  KeyframeId Add(int64_t step, KeyframeId parent, int visit = 0, const Sim3& map_from_truth = {}) {
+  // `change`: done to the picture first.
+  KeyframeId Add(int64_t step, KeyframeId parent, int visit = 0, const Sim3& map_from_truth = {},
+                 const std::function<void(FeatureFrame&)>& change = [](FeatureFrame&) {}) {
     const KeyframeId id{map_.keyframes().end_id()};
     SyntheticWorld::Picture picture = world_.Take(step);
     picture.features.frame = {id.value};
+    change(picture.features);
     MapEditor editor(map_);
     const Rigid3 pose = world_.Pose(static_cast<double>(step));
     // The keyframe's units are those of the map where it stands.

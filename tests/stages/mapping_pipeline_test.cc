@@ -51,6 +51,8 @@ Settings SettingsOf(const Folder& folder, const std::string& tiles) {
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
   settings.Override("tracker.keyframe_min_share=0.9");  // a short way, and yet many keyframes
+  settings.Override("tracker.relocalize=false");  // nobody is there to answer
+  settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());
   settings.Override("map_writer.path=" + folder.File("late.ply"));
   settings.Override("map_writer.follow=true");

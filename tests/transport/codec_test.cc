@@ -208,6 +208,7 @@ TEST(Codec, LoopsAndAdjustmentsOutOfRangeAreRefused) {
   ExpectRefused<LoopResult>([](LoopResult& result) { result.num_candidates = -1; });
   ExpectRefused<LoopResult>([](LoopResult& result) { result.num_aligned = -1; });
   ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.answers.value = -1; });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.delta = -1; });
   ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.poses.back().id.value = -1; });
   ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) {
     adjustment.poses.back().world_from_camera.rotation.w() = kNan;
@@ -265,6 +266,7 @@ void ExpectPartsHoldTogether(void (*change)(Value& value)) {
 TEST(Codec, PartsOfDifferentLoopsAreNotMixed) {
   ExpectPartsHoldTogether<LoopResult>([](LoopResult& result) { ++result.answers.value; });
   ExpectPartsHoldTogether<GlobalAdjustment>([](GlobalAdjustment& adjustment) { ++adjustment.answers.value; });
+  ExpectPartsHoldTogether<GlobalAdjustment>([](GlobalAdjustment& adjustment) { ++adjustment.delta; });
   ExpectPartsHoldTogether<RelocalizationRequest>([](RelocalizationRequest& request) { ++request.features.frame.value; });
   ExpectPartsHoldTogether<RelocalizationAnswer>([](RelocalizationAnswer& answer) { ++answer.frame.value; });
 }

@@ -400,6 +400,7 @@ template <>
 GlobalAdjustment DrawValue<GlobalAdjustment>(std::mt19937& generator, int size) {
   GlobalAdjustment adjustment;
   adjustment.answers = {Draw(generator, 0, 999)};
+  adjustment.delta = Draw(generator, 0, 999);
   adjustment.is_usable = size > 0;
   const int num_poses = size * Draw(generator, 1, 300), num_points = size * Draw(generator, 1, 3000);
   for (int i = 0; i < num_poses; ++i) adjustment.poses.push_back({{i}, DrawPose(generator)});
@@ -408,7 +409,7 @@ GlobalAdjustment DrawValue<GlobalAdjustment>(std::mt19937& generator, int size) 
 }
 template <>
 bool AreSame(const GlobalAdjustment& a, const GlobalAdjustment& b) {
-  return a.answers == b.answers && a.is_usable == b.is_usable &&
+  return a.answers == b.answers && a.delta == b.delta && a.is_usable == b.is_usable &&
          AreSameLists(a.poses, b.poses,
                       [](const auto& x, const auto& y) {
                         return x.id == y.id && AreSamePose(x.world_from_camera, y.world_from_camera);
