@@ -101,6 +101,7 @@ MapDelta ReadMapFile(const std::string& path) {
     const auto message_header = ReadHeader(event.data);
     using Result = ValueJoiner<MapSnapshotPage>::Result;
     const Result result = message_header ? joiner.Add(event.data, *message_header) : Result::kRefused;
+    if (!message_header) Refuse(path, "is damaged: one of its messages can't be read");
     if (result == Result::kRefused) Refuse(path, "is damaged: " + joiner.problem());
     if (result == Result::kIncomplete) continue;
     const MapSnapshotPage& page = joiner.value();
