@@ -33,6 +33,11 @@ class FactHash {
 uint64_t HashOf(const FeatureFrame& features) {
   FactHash hash(4);
   hash.Add(features.frame.value).Add(features.utime_us).Add(static_cast<int64_t>(features.keypoints.size()));
+  const CameraCalibration& camera = features.calibration;
+  hash.Add(static_cast<int64_t>(camera.sensor)).Add(int64_t{camera.width_px}).Add(int64_t{camera.height_px});
+  for (const double number : {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m, camera.depth_unit_m}) {
+    hash.Add(number);
+  }
   for (size_t i = 0; i < features.keypoints.size(); ++i) {
     const Keypoint& k = features.keypoints[i];
     hash.Add(uint64_t{std::bit_cast<uint32_t>(k.x_px)} << 32 | std::bit_cast<uint32_t>(k.y_px));
@@ -284,6 +289,12 @@ std::string Map::Sha256Hex() const {
     sha.Add(landmark.max_distance);
     for (const uint64_t word : landmark.descriptor) sha.Add(static_cast<int64_t>(word));
   });
+  for (const ClosedLoop& loop : closed_loops_) {
+    sha.Add(loop.current.value);
+    sha.Add(loop.matched.value);
+    sha.Add(loop.scale);
+    sha.Add(int64_t{loop.num_points});
+  }
   return sha.HexDigest();
 }
 

@@ -10,7 +10,7 @@ void MapArchive::Begin(const Map& map) { snapshots_.push_back(map.Snapshot()); }
 void MapArchive::Add(std::shared_ptr<const MapDelta> delta, const Map& map) {
   const int64_t number = delta->number;
   deltas_.push_back(std::move(delta));
-  if ((number + 1) % kSnapshotInterval != 0) return;
+  if (!snapshots_.empty() && (number + 1) % kSnapshotInterval != 0) return;
   snapshots_.push_back(map.Snapshot());
   if (snapshots_.size() <= 2) return;
   snapshots_.pop_front();
@@ -23,29 +23,20 @@ MapArchive::Answer MapArchive::AnswerTo(const MapRequest& request, const Map& ma
   if (request.snapshot >= 0) {
     const auto has_number = [&](const MapDelta& snapshot) { return snapshot.number == request.snapshot; };
     const auto held = std::find_if(snapshots_.begin(), snapshots_.end(), has_number);
-    const MapDelta* snapshot = held != snapshots_.end()                ? &*held
-                               : newest_ && has_number(*newest_) ? &*newest_
-                                                                       : nullptr;
     // One that is gone is replaced by a newer one, from its beginning.
-    const bool is_there = snapshot != nullptr && request.page >= 0 && request.page < NumSnapshotPages(*snapshot);
-    answer.page = is_there ? CutSnapshotPage(*snapshot, request.page) : CutSnapshotPage(SnapshotFor(map), 0);
+    const bool is_there = held != snapshots_.end() && request.page >= 0 && request.page < NumSnapshotPages(*held);
+    answer.page = is_there ? CutSnapshotPage(*held, request.page) : CutSnapshotPage(snapshots_.front(), 0);
     return answer;
   }
   const int64_t first_kept = deltas_.empty() ? map.next_delta() : deltas_.front()->number;
   if (request.next_delta < first_kept || request.next_delta > map.next_delta()) {
-    answer.page = CutSnapshotPage(SnapshotFor(map), 0);
+    answer.page = CutSnapshotPage(snapshots_.front(), 0);
     return answer;
   }
   for (const auto& delta : deltas_) {
     if (delta->number >= request.next_delta && answer.deltas.size() < kMaxDeltas) answer.deltas.push_back(delta);
   }
   return answer;
-}
-
-const MapDelta& MapArchive::SnapshotFor(const Map& map) {
-  if (!snapshots_.empty()) return snapshots_.front();
-  if (!newest_ || newest_->number + 1 != map.next_delta()) newest_ = map.Snapshot();
-  return *newest_;
 }
 
 }  // namespace tessera

@@ -29,18 +29,15 @@ class MapArchive {
   // or if there is no map yet.
   Answer AnswerTo(const MapRequest& request, const Map& map);
 
-  // A snapshot is taken this often, in deltas. The one handed out is between one and two such intervals old, if the map
-  // is: more than the mapper waits for anybody.
+  // A snapshot is taken of the first delta, and then this often, in deltas. The one handed out is between one and two such
+  // intervals old, or of the beginning: older than what the mapper still waits for from anybody.
   static constexpr int64_t kSnapshotInterval = 48;
   // Deltas sent for one request; who lacks more asks again.
   static constexpr size_t kMaxDeltas = 16;
 
  private:
-  const MapDelta& SnapshotFor(const Map& map);
-
-  std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest snapshot
+  std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest snapshot, or all
   std::deque<MapDelta> snapshots_;                      // features are shared with the map, so these cost little
-  std::optional<MapDelta> newest_;                      // for one whose replica went wrong before there were any
 };
 
 }  // namespace tessera

@@ -158,7 +158,8 @@ struct Codec<GlobalAdjustment> {
       adjustment->delta = message.delta;
       adjustment->is_usable = message.is_usable != 0;
     }
-    if (message.keyframe < 0 || message.keyframe != adjustment->answers.value || message.delta < 0) {
+    if (message.keyframe < 0 || message.keyframe != adjustment->answers.value || message.delta < 0 ||
+        message.delta != adjustment->delta) {
       return "its keyframe or delta is out of range";
     }
     for (size_t i = 0; i < static_cast<size_t>(message.num_poses); ++i) {

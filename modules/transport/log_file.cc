@@ -110,9 +110,11 @@ void LogFileWriter::Close() {
   if (file_ == nullptr) return;
   const bool is_written = std::fclose(file_) == 0;
   file_ = nullptr;
-  if (!is_written || std::rename((path_ + ".part").c_str(), path_.c_str()) != 0) {
-    ThrowUnwritable(path_);
-  }
+  if (is_written && std::rename((path_ + ".part").c_str(), path_.c_str()) == 0) return;
+  const int problem = errno;
+  std::remove((path_ + ".part").c_str());
+  errno = problem;
+  ThrowUnwritable(path_);
 }
 
 void LogFileWriter::ThrowUnwritable(const std::string& path) const {

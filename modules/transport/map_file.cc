@@ -55,11 +55,23 @@ MapFileHeader ReadFileHeader(LogFileReader& file, const std::string& path) {
   if (!NextEvent(file, path, &event) || event.channel != kHeaderChannel) Refuse(path, "is no map: it does not begin like one");
   ValueJoiner<MapFileHeader> joiner;
   const auto header = ReadHeader(event.data);
-  if (!header || joiner.Add(event.data, *header) != ValueJoiner<MapFileHeader>::Result::kComplete ||
-      joiner.value().version != kVersion) {
-    Refuse(path, "was written by another version of Tessera: make the map again with this one");
+  if (header && joiner.Add(event.data, *header) == ValueJoiner<MapFileHeader>::Result::kComplete) {
+    if (joiner.value().version == kVersion) return joiner.value();
+  } else if (header) {
+    Refuse(path, "is damaged, or holds no keyframes: " + joiner.problem());
   }
-  return joiner.value();
+  Refuse(path, "was written by another version of Tessera: make the map again with this one");
+}
+
+// Every page names the snapshot that it belongs to.
+bool BelongsTo(const MapSnapshotPage& page, const MapDelta& snapshot) {
+  return page.part.number == snapshot.number && page.part.answers == snapshot.answers && page.part.hash == snapshot.hash;
+}
+
+// What the hash does not cover: that the file's parts speak of one and the same map.
+bool DoesFit(const MapFileHeader& header, const Map& map) {
+  return header.num_keyframes == map.keyframes().size() && header.num_landmarks == map.landmarks().size() &&
+         header.camera == CameraOf(map) && map.answered().value + 1 >= map.keyframes().end_id();
 }
 
 }  // namespace
@@ -89,19 +101,23 @@ MapDelta ReadMapFile(const std::string& path) {
     const auto message_header = ReadHeader(event.data);
     using Result = ValueJoiner<MapSnapshotPage>::Result;
     const Result result = message_header ? joiner.Add(event.data, *message_header) : Result::kRefused;
+    if (!message_header) Refuse(path, "is damaged: one of its messages can't be read");
     if (result == Result::kRefused) Refuse(path, "is damaged: " + joiner.problem());
     if (result == Result::kIncomplete) continue;
     const MapSnapshotPage& page = joiner.value();
     if (page.page != num_pages || page.num_pages != header.num_pages) Refuse(path, "is damaged: its pages do not fit");
     if (num_pages++ == 0) {
       snapshot = page.part;
-    } else {
+    } else if (BelongsTo(page, snapshot)) {
       AppendPage(page, &snapshot);
+    } else {
+      Refuse(path, "is damaged: its pages do not fit");
     }
   }
   if (num_pages != header.num_pages) Refuse(path, "is cut off: copy it again, or make the map again");
   Map trial;
   if (const std::string problem = trial.Apply(snapshot); !problem.empty()) Refuse(path, "is damaged: " + problem);
+  if (!DoesFit(header, trial)) Refuse(path, "is damaged: its beginning speaks of another map");
   return snapshot;
 }
 

@@ -16,14 +16,22 @@ namespace {
 class Owner {
  public:
   explicit Owner(unsigned seed) : generator_(seed) {}
+  // Begins with a map of so many deltas, loaded from its snapshot.
+  Owner(unsigned seed, int num_loaded) : generator_(seed) {
+    Map made;
+    for (int i = 0; i < num_loaded; ++i) RandomChange(made, generator_);
+    EXPECT_EQ(map_.Apply(made.Snapshot()), "");
+    archive_.Begin(map_);
+  }
 
   MapFollower::Delta Next() {
     auto delta = std::make_shared<const MapDelta>(RandomChange(map_, generator_));
     archive_.Add(delta, map_);
     return delta;
   }
+  MapArchive::Answer AnswerTo(const MapRequest& request) { return archive_.AnswerTo(request, map_); }
   void Answer(const MapRequest& request, MapFollower& follower) {
-    const MapArchive::Answer answer = archive_.AnswerTo(request, map_);
+    const MapArchive::Answer answer = AnswerTo(request);
     num_pages_ += answer.page ? 1 : 0;
     for (const auto& delta : answer.deltas) follower.Receive(delta);
     if (answer.page) follower.Receive(*answer.page);
@@ -137,7 +145,7 @@ void JoinLate(int num_before, bool hears_deltas) {
 }
 
 TEST(MapFollower, WhoComesLateGetsASnapshotAndGoesOn) {
-  for (const int num_before : {17, 50, 120}) {
+  for (const int num_before : {100, 143, 200}) {
     JoinLate(num_before, true);
     JoinLate(num_before, false);
   }
@@ -149,10 +157,15 @@ TEST(MapFollower, WhoComesLateToAYoungMapGetsItsDeltas) {
   Map replica;
   owner.Answer(*follower.Request(), follower);
   EXPECT_TRUE(follower.Request()) << "there is no map yet";
-  for (int i = 0; i < 3; ++i) owner.Next();
+  for (int i = 0; i < 40; ++i) owner.Next();
   owner.Answer(*follower.Request(), follower);
   EXPECT_EQ(Update(follower, replica), "");
-  EXPECT_FALSE(follower.Request());
+  EXPECT_EQ(replica.next_delta(), static_cast<int64_t>(MapArchive::kMaxDeltas));
+  follower.Expect(40);
+  while (follower.Request()) {
+    owner.Answer(*follower.Request(), follower);
+    EXPECT_EQ(Update(follower, replica), "");
+  }
   EXPECT_EQ(owner.num_pages(), 0);
   ExpectEqual(replica, owner.map());
 }
@@ -198,7 +211,7 @@ TEST(MapFollower, PagesForOthersAreNoBusinessOfOnesOwn) {
 
 TEST(MapArchive, SeveralFollowersMayReadDifferentSnapshots) {
   Owner owner(7);
-  for (int i = 0; i < 40; ++i) owner.Next();
+  for (int i = 0; i < 130; ++i) owner.Next();  // a new snapshot comes at 144
   std::vector<MapFollower> followers(4, MapFollower(true));
   std::vector<Map> replicas(4);
   for (int round = 0; round < 2000; ++round) {
@@ -216,6 +229,52 @@ TEST(MapArchive, SeveralFollowersMayReadDifferentSnapshots) {
     }
     EXPECT_EQ(Update(followers[i], replicas[i]), "");
     ExpectEqual(replicas[i], owner.map());
+  }
+}
+
+// Who begins with the base snapshot finds all that the mapper may still wait for in the deltas since: it repeats
+// everything that another one did on the map as it was then.
+void ExpectOldBaseWithAllDeltasSince(Owner& owner, int64_t num_since_begin) {
+  const std::optional<MapSnapshotPage> page = owner.AnswerTo({}).page;
+  ASSERT_TRUE(page.has_value());
+  const int64_t next = owner.map().next_delta();
+  const int64_t age = next - 1 - page->part.number;
+  EXPECT_GE(age, std::min(num_since_begin, MapArchive::kSnapshotInterval)) << next;
+  EXPECT_LE(age, 2 * MapArchive::kSnapshotInterval) << next;
+  for (int64_t number = page->part.number + 1; number < next;) {
+    const MapArchive::Answer answer = owner.AnswerTo({.next_delta = number});
+    ASSERT_FALSE(answer.page.has_value()) << "delta " << number << " of " << next << " is gone";
+    ASSERT_FALSE(answer.deltas.empty());
+    for (const auto& delta : answer.deltas) EXPECT_EQ(delta->number, number++);
+  }
+}
+
+TEST(MapArchive, TheBaseSnapshotIsOldAndAllDeltasSinceAreThere) {
+  Owner owner(10);
+  for (int64_t i = 0; i < 200; ++i) {
+    owner.Next();
+    ExpectOldBaseWithAllDeltasSince(owner, i);
+  }
+}
+
+TEST(MapArchive, BeginsWithALoadedMap) {
+  for (const int num_loaded : {1, 46, 60}) {
+    Owner owner(11, num_loaded);
+    const MapArchive::Answer answer = owner.AnswerTo({.next_delta = 0});
+    ASSERT_TRUE(answer.page.has_value()) << "nobody has the deltas that made it";
+    EXPECT_EQ(answer.page->part.number, num_loaded - 1);
+    for (int64_t i = 1; i < 120; ++i) {
+      owner.Next();
+      ExpectOldBaseWithAllDeltasSince(owner, i);
+    }
+    MapFollower late(true);
+    Map replica;
+    while (late.Request()) {
+      owner.Answer(*late.Request(), late);
+      late.Expect(owner.map().next_delta());
+      EXPECT_EQ(Update(late, replica), "");
+    }
+    ExpectEqual(replica, owner.map());
   }
 }
 

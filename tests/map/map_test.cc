@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <map>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "map/random_changes.h"
 
@@ -20,6 +24,7 @@ TEST(Map, ReplicasOfTheSameDeltasAreEqualAndASnapshotLeadsToTheSame) {
     EXPECT_EQ(late.hash(), owner.hash());
     EXPECT_EQ(late.next_delta(), owner.next_delta());
     EXPECT_EQ(late.Sha256Hex(), owner.Sha256Hex());
+    EXPECT_EQ(late.closed_loops(), owner.closed_loops());
   }
   EXPECT_EQ(replica.Sha256Hex(), owner.Sha256Hex());
   EXPECT_GT(owner.landmarks().size(), 20);
@@ -45,6 +50,7 @@ TEST(Map, TheStateDoesNotDependOnHowChangesAreSplit) {
     for (const auto& x : delta.changed_parents) apply_one({.changed_parents = {x}});
     for (const auto& x : delta.removed_landmarks) apply_one({.removed_landmarks = {x}});
     for (const auto& x : delta.removed_keyframes) apply_one({.removed_keyframes = {x}});
+    for (const auto& x : delta.closed_loops) apply_one({.closed_loops = {x}});
   }
   EXPECT_EQ(split.hash(), owner.hash());
   EXPECT_EQ(split.Sha256Hex(), owner.Sha256Hex());
@@ -60,6 +66,58 @@ TEST(Map, TheHashCoversEveryKeypoint) {
   Map other;
   EXPECT_NE(other.Apply(delta).find("wrong hash"), std::string::npos);
   EXPECT_NE(other.Sha256Hex(), map.Sha256Hex());
+}
+
+// Whether a replica takes the delta, once `change` was made to it, for another one.
+bool IsNoticed(const std::function<void(MapDelta&)>& change) {
+  std::mt19937 generator(6);
+  Map owner, replica;
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(replica.Apply(RandomChange(owner, generator)), "");
+  MapDelta delta = RandomChange(owner, generator);  // moves a keyframe, and closes a loop
+  change(delta);
+  const bool is_noticed = replica.Apply(delta).find("wrong hash") != std::string::npos;
+  EXPECT_EQ(is_noticed, replica.Sha256Hex() != owner.Sha256Hex());
+  return is_noticed;
+}
+
+TEST(Map, TheHashCoversScalesAndClosedLoops) {
+  EXPECT_FALSE(IsNoticed([](MapDelta&) {}));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.new_keyframes[0].scale *= 1.0 + 1e-15; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.moved_keyframes[0].scale *= 1.0 + 1e-15; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.closed_loops[0].scale *= 1.0 + 1e-15; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { ++delta.closed_loops[0].current.value; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { ++delta.closed_loops[0].matched.value; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { ++delta.closed_loops[0].num_points; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.closed_loops.push_back(delta.closed_loops[0]); }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.closed_loops.clear(); }));
+}
+
+// A keyframe with other intrinsics sees other rays.
+TEST(Map, TheHashCoversTheCamera) {
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) {
+    auto features = std::make_shared<FeatureFrame>(*delta.new_keyframes[0].features);
+    features->calibration.fx_px += 1e-9;
+    delta.new_keyframes[0].features = features;
+  }));
+}
+
+TEST(Map, ScaleAndLoopsComeFromTheDeltas) {
+  std::mt19937 generator(7);
+  Map map;
+  std::map<KeyframeId, double> scales;
+  std::vector<ClosedLoop> loops;
+  for (int i = 0; i < 20; ++i) {
+    const MapDelta delta = RandomChange(map, generator);
+    for (const auto& added : delta.new_keyframes) scales[added.id] = added.scale;
+    for (const auto& moved : delta.moved_keyframes) scales[moved.id] = moved.scale;
+    for (const KeyframeId removed : delta.removed_keyframes) scales.erase(removed);
+    loops.insert(loops.end(), delta.closed_loops.begin(), delta.closed_loops.end());
+  }
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
+    EXPECT_EQ(keyframe.scale, scales.at(id));
+    EXPECT_EQ(keyframe.WorldFromKeyframe().scale, scales.at(id));
+  });
+  EXPECT_EQ(map.closed_loops(), loops);
 }
 
 TEST(Map, RefusesIdsThatLeapAhead) {

@@ -73,6 +73,10 @@ inline MapDelta RandomChange(Map& map, std::mt19937& generator) {
     const auto shift = static_cast<double>(generator() % 100);
     delta.moved_keyframes.push_back({{keyframe.value - 1}, {Eigen::Quaterniond::Identity(), {shift, 0, 0}}, 1.0 + shift});
   }
+  if (keyframe.value % 4 == 3) {
+    const KeyframeId matched{static_cast<int64_t>(generator()) % keyframe.value};
+    delta.closed_loops.push_back({keyframe, matched, 0.5 + 0.01 * static_cast<double>(generator() % 100), 50});
+  }
   // The hash is found by trying on a copy, whose complaint about the missing hash is expected.
   Map trial = map;
   EXPECT_NE(trial.Apply(delta).find("wrong hash"), std::string::npos);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "settings/settings.h"
+#include "stages/loop_closer/loop_closer.h"
 #include "stages/mapper/mapper.h"
 #include "tracking/map_tracker.h"
 
@@ -38,6 +39,18 @@ TEST(DefaultSettings, OfTheMapper) {
   EXPECT_EQ(settings.Get<bool>("mapper.always_ceres"), options.bundle.is_always_ceres);
   EXPECT_EQ(settings.Get<int>("mapper.bundle_iterations"), options.bundle.max_num_iterations);
   EXPECT_EQ(settings.Get<double>("mapper.redundant_share"), options.culling.redundant_share);
+}
+
+TEST(DefaultSettings, OfLoops) {
+  const Settings settings = Defaults();
+  const LoopCloserOptions options;
+  EXPECT_EQ(settings.Get<int>("loop_closer.min_matches"), options.verification.min_matches);
+  EXPECT_EQ(settings.Get<int>("loop_closer.min_aligned"), options.verification.similarity.min_inliers);
+  EXPECT_EQ(settings.Get<int>("loop_closer.min_seen"), options.verification.min_seen);
+  EXPECT_EQ(settings.Get<int>("loop_closer.min_relocalized"), options.relocalization.min_seen);
+  EXPECT_EQ(settings.Get<int>("mapper.loop_delay_keyframes"), CorrectionDelays{}.loop_keyframes);
+  EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_keyframes"), CorrectionDelays{}.adjustment_keyframes);
+  EXPECT_EQ(settings.Get<int>("global_adjuster.iterations"), GlobalBundleOptions().max_num_iterations);
 }
 
 }  // namespace

@@ -1,13 +1,11 @@
 // The whole pipeline with tracker, mapper and evaluator over memq:// in one process: the same two hashes whatever
 // happens on the way, and late listeners that reach the mapper's map.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <sstream>
 
 #include "evaluation/map_text.h"
 #include "map/map.h"
@@ -18,6 +16,7 @@
 #include "stages/mapper/mapper_stage.h"
 #include "stages/moving_scene.h"
 #include "stages/reassembler/reassembler_stage.h"
+#include "stages/run_folder.h"
 #include "stages/tracker/tracker_stage.h"
 #include "transport/memory_bus.h"
 
@@ -28,29 +27,13 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kNumFrames = 50;
 
-class Folder {
- public:
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "tessera-stages-XXXXXX").string();
-    path_ = mkdtemp(pattern.data());
-  }
-  ~Folder() { fs::remove_all(path_); }
-  std::string File(const std::string& name) const { return path_ + "/" + name; }
-  std::string Read(const std::string& name) const {
-    std::ifstream file(File(name));
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-Settings SettingsOf(const Folder& folder, const std::string& tiles) {
+Settings SettingsOf(const RunFolder& folder, const std::string& tiles) {
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
   settings.Override("tracker.keyframe_min_share=0.9");  // a short way, and yet many keyframes
+  settings.Override("tracker.relocalize=false");  // nobody is there to answer
+  settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());
   settings.Override("map_writer.path=" + folder.File("late.ply"));
   settings.Override("map_writer.follow=true");
@@ -93,7 +76,7 @@ class StackRun {
   nlohmann::json Figures() const { return nlohmann::json::parse(folder_.Read("run.json")); }
 
   MemoryBus& bus() { return bus_; }
-  const Folder& folder() const { return folder_; }
+  const RunFolder& folder() const { return folder_; }
   const std::vector<PoseEstimate>& poses() const { return poses_; }
   const StageStatus& status(const std::string& name) { return statuses_[name]; }
 
@@ -107,7 +90,7 @@ class StackRun {
     }
   }
 
-  Folder folder_;
+  RunFolder folder_;
   MemoryBus bus_;
   StageContext& camera_;
   MovingScene scene_;

@@ -16,7 +16,10 @@ class MovingScene {
   static constexpr int kFarShift = 2, kNearShift = 4;  // px a frame
   static constexpr int kStepsPerBaseline = 4;          // so the disparities are 8 and 16 px, the walls 7.5 and 3.75 m off
 
-  MovingScene() : far_(RectanglesImage(kTexture, kHeight / 2, 1)), near_(RectanglesImage(kTexture, kHeight / 2, 2)) {}
+  // Walls long enough for steps 0 .. max_steps.
+  explicit MovingScene(int max_steps = kMaxFrames)
+      : far_(RectanglesImage(TextureWidth(max_steps), kHeight / 2, 1)),
+        near_(RectanglesImage(TextureWidth(max_steps), kHeight / 2, 2)) {}
 
   static CameraCalibration Calibration() {
     return {.sensor = SensorType::kStereo,
@@ -28,13 +31,15 @@ class MovingScene {
             .cy_px = 120,
             .baseline_m = kBaselineM};
   }
-  CameraFrame Frame(int64_t id) const {
+  CameraFrame Frame(int64_t id) const { return Frame(id, static_cast<int>(id)); }
+  // What the camera sees after `step` steps.
+  CameraFrame Frame(int64_t id, int step) const {
     CameraFrame frame;
     frame.id = {id};
     frame.utime_us = 100'000 * id;
     frame.sensor = SensorType::kStereo;
-    frame.left = Picture(static_cast<int>(id));
-    frame.right = Picture(static_cast<int>(id) + kStepsPerBaseline);
+    frame.left = Picture(step);
+    frame.right = Picture(step + kStepsPerBaseline);
     return frame;
   }
   static constexpr double kBaselineM = 0.2;
@@ -42,7 +47,7 @@ class MovingScene {
   static constexpr int kMaxFrames = 60;
 
  private:
-  static constexpr int kTexture = kWidth + kNearShift * (kMaxFrames + kStepsPerBaseline);
+  static constexpr int TextureWidth(int max_steps) { return kWidth + kNearShift * (max_steps + kStepsPerBaseline); }
 
   GrayImage Picture(int step) const {
     GrayImage image(kWidth, kHeight);

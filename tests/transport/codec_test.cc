@@ -71,6 +71,10 @@ TEST(Codec, LargeValuesAreCut) {
   EXPECT_GT(Encode(DrawValue<CameraFrame>(generator, 1), 1380).size(), 10U);
   EXPECT_GT(Encode(DrawValue<FeatureFrame>(generator, 1), 1380).size(), 2U);
   EXPECT_GT(Encode(DrawValue<MapDelta>(generator, 1), 1380).size(), 10U);
+  EXPECT_GT(Encode(DrawValue<LoopResult>(generator, 1), 1380).size(), 2U);
+  EXPECT_GT(Encode(DrawValue<GlobalAdjustment>(generator, 1), 1380).size(), 2U);
+  EXPECT_GT(Encode(DrawValue<RelocalizationRequest>(generator, 1), 1380).size(), 2U);
+  EXPECT_GT(Encode(DrawValue<RelocalizationAnswer>(generator, 1), 1380).size(), 2U);
   EXPECT_EQ(Encode(DrawValue<PoseEstimate>(generator, 1), 1380).size(), 1U);
 }
 
@@ -187,6 +191,84 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.page = page.num_pages; });
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.part.removed_keyframes.push_back({1}); });
   ExpectRefused<MapRequest>([](MapRequest& request) { request.page = -1; });
+}
+
+TEST(Codec, LoopsAndAdjustmentsOutOfRangeAreRefused) {
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.answers.value = -1; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.matched = result.answers; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.matched.value = -2; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.matched_from_current.scale = 0.0; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.matched_from_current.scale = -1.0; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.matched_from_current.rotation.coeffs() *= 1.01; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.corrections.back().id.value = -1; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.corrections.back().new_world_from_old.scale = kNan; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.corrections[0].new_world_from_old.translation.y() = kNan; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.seen.back().keypoint = -1; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.seen.back().landmark.value = -1; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.num_candidates = -1; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.num_aligned = -1; });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.answers.value = -1; });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.delta = -1; });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.poses.back().id.value = -1; });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) {
+    adjustment.poses.back().world_from_camera.rotation.w() = kNan;
+  });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.points.back().id.value = -1; });
+  ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) {
+    adjustment.points.back().position_in_world.z() = INFINITY;
+  });
+}
+
+TEST(Codec, RelocalizationsAndMapFilesOutOfRangeAreRefused) {
+  ExpectRefused<RelocalizationRequest>([](RelocalizationRequest& request) { request.last_keyframe.value = -2; });
+  ExpectRefused<RelocalizationRequest>([](RelocalizationRequest& request) { request.features.frame.value = -1; });
+  ExpectRefused<RelocalizationRequest>([](RelocalizationRequest& request) {
+    request.features.keypoints.back().x_px = std::nanf("");
+  });
+  ExpectRefused<RelocalizationAnswer>([](RelocalizationAnswer& answer) { answer.frame.value = -1; });
+  ExpectRefused<RelocalizationAnswer>([](RelocalizationAnswer& answer) { answer.reference.value = -2; });
+  ExpectRefused<RelocalizationAnswer>([](RelocalizationAnswer& answer) { answer.num_candidates = -1; });
+  ExpectRefused<RelocalizationAnswer>([](RelocalizationAnswer& answer) {
+    answer.reference_from_camera.translation.x() = kNan;
+  });
+  ExpectRefused<RelocalizationAnswer>([](RelocalizationAnswer& answer) { answer.seen.back().keypoint = -1; });
+  ExpectRefused<PoseEstimate>([](PoseEstimate& pose) { pose.relocalized_by.value = -2; });
+  ExpectRefused<MapFileHeader>([](MapFileHeader& header) { header.num_pages = 0; });
+  ExpectRefused<MapFileHeader>([](MapFileHeader& header) { header.num_keyframes = -1; });
+  ExpectRefused<MapFileHeader>([](MapFileHeader& header) { header.num_landmarks = -1; });
+  ExpectRefused<MapFileHeader>([](MapFileHeader& header) { header.camera.fx_px = 0.0; });
+}
+
+TEST(Codec, ScalesAndLoopsOfTheMapOutOfRangeAreRefused) {
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.new_keyframes[0].scale = 0.0; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.moved_keyframes[0].scale = -1.0; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.moved_keyframes[0].scale = kNan; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.closed_loops[0].scale = 0.0; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.closed_loops[0].current.value = -1; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.closed_loops[0].matched.value = -1; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.closed_loops[0].num_points = -1; });
+}
+
+// A part must not go on with a value of another keyframe or frame.
+template <class Value>
+void ExpectPartsHoldTogether(void (*change)(Value& value)) {
+  std::mt19937 generator(7);
+  const Value first = DrawValue<Value>(generator, 1);
+  Value second = first;
+  change(second);
+  std::vector<Bytes> mixed = Encode(first, 1380);
+  ASSERT_GE(mixed.size(), 3U) << TypeName<Value>();
+  mixed[1] = Encode(second, 1380)[1];
+  Value decoded;
+  EXPECT_NE(Decode(mixed, &decoded), "") << TypeName<Value>();
+}
+
+TEST(Codec, PartsOfDifferentLoopsAreNotMixed) {
+  ExpectPartsHoldTogether<LoopResult>([](LoopResult& result) { ++result.answers.value; });
+  ExpectPartsHoldTogether<GlobalAdjustment>([](GlobalAdjustment& adjustment) { ++adjustment.answers.value; });
+  ExpectPartsHoldTogether<GlobalAdjustment>([](GlobalAdjustment& adjustment) { ++adjustment.delta; });
+  ExpectPartsHoldTogether<RelocalizationRequest>([](RelocalizationRequest& request) { ++request.features.frame.value; });
+  ExpectPartsHoldTogether<RelocalizationAnswer>([](RelocalizationAnswer& answer) { ++answer.frame.value; });
 }
 
 // A keyframe must not go on in a message of another one.

@@ -92,11 +92,15 @@ bool AreSame(const GroundTruthPose& a, const GroundTruthPose& b) {
 
 template <>
 EndOfStream DrawValue<EndOfStream>(std::mt19937& generator, int) {
-  return {.stage = "camera", .num_frames = Draw(generator, 10, 999), .num_dropped = Draw(generator, 0, 10)};
+  return {.stage = "camera",
+          .num_frames = Draw(generator, 10, 999),
+          .num_dropped = Draw(generator, 0, 10),
+          .num_values = Draw(generator, 0, 999)};
 }
 template <>
 bool AreSame(const EndOfStream& a, const EndOfStream& b) {
-  return a.stage == b.stage && a.num_frames == b.num_frames && a.num_dropped == b.num_dropped;
+  return a.stage == b.stage && a.num_frames == b.num_frames && a.num_dropped == b.num_dropped &&
+         a.num_values == b.num_values;
 }
 
 template <>
@@ -248,7 +252,7 @@ Landmark DrawLandmark(std::mt19937& generator) {
           .descriptor = DrawDescriptor(generator)};
 }
 
-// Keyframes, landmarks and observations: what a snapshot is made of.
+// Keyframes, landmarks, observations and loops: what a snapshot is made of.
 MapDelta DrawContent(std::mt19937& generator, int size) {
   MapDelta delta{.number = Draw(generator, 0, 99), .answers = {Draw(generator, -1, 99)}, .hash = generator()};
   for (int i = 0; i < 3 * size; ++i) {
@@ -259,6 +263,9 @@ MapDelta DrawContent(std::mt19937& generator, int size) {
   for (int i = 0; i < num_landmarks; ++i) {
     delta.changed_landmarks.push_back({{Draw(generator, 0, 9999)}, DrawLandmark(generator)});
     delta.new_observations.push_back({{Draw(generator, 0, 99)}, {{Draw(generator, 0, 99)}, Draw(generator, 0, 99)}});
+  }
+  for (int i = 0; i < 20 * size; ++i) {
+    delta.closed_loops.push_back({{Draw(generator, 0, 99)}, {Draw(generator, 0, 99)}, DrawReal(generator, 0.1, 9), 7});
   }
   return delta;
 }
@@ -282,7 +289,6 @@ MapDelta DrawValue<MapDelta>(std::mt19937& generator, int size) {
     delta.moved_keyframes.push_back({{Draw(generator, 0, 99)}, DrawPose(generator), DrawReal(generator, 0.1, 9)});
     delta.changed_parents.push_back({{Draw(generator, 0, 99)}, {Draw(generator, -1, 99)}});
     delta.removed_keyframes.push_back({Draw(generator, 0, 99)});
-    delta.closed_loops.push_back({{Draw(generator, 0, 99)}, {Draw(generator, 0, 99)}, DrawReal(generator, 0.1, 9), 7});
   }
   delta.asks_adjustment = generator() % 2 == 0;
   for (int i = 0; i < 500 * size; ++i) {
@@ -330,6 +336,114 @@ bool AreSame(const MapRequest& a, const MapRequest& b) {
 }
 
 template <>
+MapFileHeader DrawValue<MapFileHeader>(std::mt19937& generator, int) {
+  return {.version = Draw(generator, 0, 9),
+          .num_pages = Draw(generator, 1, 999),
+          .num_keyframes = Draw(generator, 0, 999),
+          .num_landmarks = Draw(generator, 0, 9999),
+          .camera = DrawCalibration(generator, 1241, 376)};
+}
+template <>
+bool AreSame(const MapFileHeader& a, const MapFileHeader& b) {
+  return a.version == b.version && a.num_pages == b.num_pages && a.num_keyframes == b.num_keyframes &&
+         a.num_landmarks == b.num_landmarks && a.camera == b.camera;
+}
+
+namespace {
+
+std::vector<SeenLandmark> DrawSeen(std::mt19937& generator, int num) {
+  std::vector<SeenLandmark> seen;
+  for (int i = 0; i < num; ++i) seen.push_back({Draw(generator, 0, 1999), {Draw(generator, 0, 99999)}});
+  return seen;
+}
+
+Sim3 DrawSimilarity(std::mt19937& generator) {
+  const Rigid3 pose = DrawPose(generator);
+  return Sim3::From(pose, DrawReal(generator, 0.1, 9));
+}
+
+bool AreSameSimilarity(const Sim3& a, const Sim3& b) {
+  return a.scale == b.scale && AreSamePose(a.Pose(), b.Pose());
+}
+
+}  // namespace
+
+template <>
+LoopResult DrawValue<LoopResult>(std::mt19937& generator, int size) {
+  LoopResult result;
+  result.answers = {Draw(generator, 10, 999)};
+  result.num_candidates = Draw(generator, 0, 9);
+  result.num_consistent = Draw(generator, 0, 9);
+  result.num_matched = Draw(generator, 0, 9);
+  result.num_aligned = Draw(generator, 0, 9);
+  if (size == 0) return result;
+  result.matched = {Draw(generator, 0, 9)};
+  result.matched_from_current = DrawSimilarity(generator);
+  result.joins_parts = Draw(generator, 0, 1) == 1;
+  const int num_corrections = Draw(generator, 1, 300);
+  for (int i = 0; i < num_corrections; ++i) result.corrections.push_back({{i}, DrawSimilarity(generator)});
+  result.seen = DrawSeen(generator, Draw(generator, 1, 900));
+  return result;
+}
+template <>
+bool AreSame(const LoopResult& a, const LoopResult& b) {
+  return a.answers == b.answers && a.matched == b.matched &&
+         AreSameSimilarity(a.matched_from_current, b.matched_from_current) && a.joins_parts == b.joins_parts &&
+         a.seen == b.seen && a.num_candidates == b.num_candidates && a.num_consistent == b.num_consistent &&
+         a.num_matched == b.num_matched && a.num_aligned == b.num_aligned &&
+         AreSameLists(a.corrections, b.corrections, [](const auto& x, const auto& y) {
+           return x.id == y.id && AreSameSimilarity(x.new_world_from_old, y.new_world_from_old);
+         });
+}
+
+template <>
+GlobalAdjustment DrawValue<GlobalAdjustment>(std::mt19937& generator, int size) {
+  GlobalAdjustment adjustment;
+  adjustment.answers = {Draw(generator, 0, 999)};
+  adjustment.delta = Draw(generator, 0, 999);
+  adjustment.is_usable = size > 0;
+  const int num_poses = size * Draw(generator, 1, 300), num_points = size * Draw(generator, 1, 3000);
+  for (int i = 0; i < num_poses; ++i) adjustment.poses.push_back({{i}, DrawPose(generator)});
+  for (int i = 0; i < num_points; ++i) adjustment.points.push_back({{i}, DrawPose(generator).translation});
+  return adjustment;
+}
+template <>
+bool AreSame(const GlobalAdjustment& a, const GlobalAdjustment& b) {
+  return a.answers == b.answers && a.delta == b.delta && a.is_usable == b.is_usable &&
+         AreSameLists(a.poses, b.poses,
+                      [](const auto& x, const auto& y) {
+                        return x.id == y.id && AreSamePose(x.world_from_camera, y.world_from_camera);
+                      }) &&
+         AreSameLists(a.points, b.points, [](const auto& x, const auto& y) {
+           return x.id == y.id && x.position_in_world == y.position_in_world;
+         });
+}
+
+template <>
+RelocalizationRequest DrawValue<RelocalizationRequest>(std::mt19937& generator, int size) {
+  return {.features = DrawValue<FeatureFrame>(generator, size), .last_keyframe = {Draw(generator, -1, 99)}};
+}
+template <>
+bool AreSame(const RelocalizationRequest& a, const RelocalizationRequest& b) {
+  return AreSame(a.features, b.features) && a.last_keyframe == b.last_keyframe;
+}
+
+template <>
+RelocalizationAnswer DrawValue<RelocalizationAnswer>(std::mt19937& generator, int size) {
+  return {.frame = {Draw(generator, 0, 9999)},
+          .reference = {size == 0 ? -1 : Draw(generator, 0, 99)},
+          .reference_from_camera = DrawPose(generator),
+          .seen = DrawSeen(generator, size * Draw(generator, 1, 900)),
+          .num_candidates = Draw(generator, 0, 9)};
+}
+template <>
+bool AreSame(const RelocalizationAnswer& a, const RelocalizationAnswer& b) {
+  return a.frame == b.frame && a.reference == b.reference &&
+         AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.seen == b.seen &&
+         a.num_candidates == b.num_candidates;
+}
+
+template <>
 PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
   return {.frame = {Draw(generator, 0, 9999)},
           .utime_us = Draw(generator, 0, 1 << 30),
@@ -343,6 +457,8 @@ PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
           .num_inliers = Draw(generator, 0, 2000),
           .num_landmarks = Draw(generator, 0, 2000),
           .is_keyframe = Draw(generator, 0, 1) == 1,
+          .is_relocalized = Draw(generator, 0, 1) == 1,
+          .relocalized_by = {Draw(generator, -1, 99)},
           .num_deltas = Draw(generator, 0, 99),
           .is_live = Draw(generator, 0, 1) == 1,
           .map_wait_us = Draw(generator, 0, 9999)};
@@ -353,7 +469,8 @@ bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
          AreSamePose(a.world_from_camera, b.world_from_camera) && a.reference_keyframe == b.reference_keyframe &&
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_features == b.num_features &&
          a.num_matches == b.num_matches && a.num_inliers == b.num_inliers && a.num_landmarks == b.num_landmarks &&
-         a.is_keyframe == b.is_keyframe && a.num_deltas == b.num_deltas && a.is_live == b.is_live &&
+         a.is_keyframe == b.is_keyframe && a.is_relocalized == b.is_relocalized &&
+         a.relocalized_by == b.relocalized_by && a.num_deltas == b.num_deltas && a.is_live == b.is_live &&
          a.map_wait_us == b.map_wait_us;
 }
 

@@ -1,4 +1,4 @@
-// Values of every type that is sent, drawn by a seed, and whether two of them are the same.
+// Values of every type that is sent or kept in a file, drawn by a seed, and whether two of them are the same.
 #pragma once
 
 #include <random>
@@ -16,9 +16,9 @@ Value DrawValue(std::mt19937& generator, int size);
 template <class Value>
 bool AreSame(const Value& a, const Value& b);
 
-// Calls visit.operator()<Value>() for each type.
+// Calls visit.operator()<Value>() for each type that is sent.
 template <class Visit>
-void ForEachValueType(Visit visit) {
+void ForEachSentType(Visit visit) {
   visit.template operator()<CameraFrame>();
   visit.template operator()<CameraCalibration>();
   visit.template operator()<GroundTruthPose>();
@@ -32,10 +32,21 @@ void ForEachValueType(Visit visit) {
   visit.template operator()<MapDelta>();
   visit.template operator()<MapSnapshotPage>();
   visit.template operator()<MapRequest>();
+  visit.template operator()<LoopResult>();
+  visit.template operator()<GlobalAdjustment>();
+  visit.template operator()<RelocalizationRequest>();
+  visit.template operator()<RelocalizationAnswer>();
   visit.template operator()<PoseEstimate>();
   visit.template operator()<StageStatus>();
   visit.template operator()<Heartbeat>();
   visit.template operator()<RepairRequest>();
+}
+
+// The same for these, and what stands in files alone.
+template <class Visit>
+void ForEachValueType(Visit visit) {
+  ForEachSentType(visit);
+  visit.template operator()<MapFileHeader>();
 }
 
 inline MessageHeader ExampleHeader() {

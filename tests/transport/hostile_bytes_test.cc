@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kNumCases = 8000;  // by type; 112,000 in all
+constexpr int kNumCases = 8000;  // by type; 176,000 in all
 
 Bytes RandomBytes(std::mt19937& generator, size_t max_size) {
   Bytes bytes(generator() % max_size);

@@ -43,7 +43,7 @@ struct SendAndReceive {
   }
 };
 
-TEST(MemoryBus, EveryTypeArrives) { ForEachValueType(SendAndReceive()); }
+TEST(MemoryBus, EveryTypeArrives) { ForEachSentType(SendAndReceive()); }
 
 // A camera that sends frames, and a listener that counts them.
 class Pair {

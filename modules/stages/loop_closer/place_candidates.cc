@@ -14,7 +14,8 @@ struct Group {
 };
 
 // Neighbouring keyframes look alike, so their scores are added: a place that only one image of speaks for is weak. Best
-// group first, each named by its best keyframe; groups with the same best keyframe are one.
+// group first, each named by its best keyframe (of equals, which a camera that stands still makes, the oldest); groups with
+// the same best keyframe are one.
 std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::Place>& found,
                               const CandidateOptions& options) {
   std::map<KeyframeId, double> score_of;
@@ -27,7 +28,7 @@ std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::P
       const auto member = score_of.find(id);
       if (member == score_of.end()) continue;
       group.score += member->second;
-      if (member->second > best_score) {
+      if (member->second > best_score || (member->second == best_score && id < group.best)) {
         best_score = member->second;
         group.best = id;
       }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "map/spanning_tree.h"
+#include "tracking/map_replica.h"
 
 namespace tessera {
 namespace {
@@ -70,8 +71,7 @@ void BendMap(const Corrections& given, MapEditor& editor) {
     const std::vector<Observation>& observations = map.ObservationsOf(id);
     const auto found = observations.empty() ? corrections.end() : corrections.find(observations.front().keyframe);
     if (found == corrections.end()) return;
-    moved.emplace_back(id, landmark);
-    moved.back().second.position_in_world = found->second * landmark.position_in_world;
+    moved.emplace_back(id, InWorld(found->second, landmark));
   });
   for (const auto& [id, landmark] : moved) editor.ChangeLandmark(id, landmark);
   for (const auto& [id, new_world_from_old] : corrections) {

@@ -23,7 +23,7 @@ using Corrections = std::map<KeyframeId, Sim3>;
 //   world_from_keyframe <- C world_from_keyframe,   position <- C position
 //
 // A keyframe without a correction takes its parent's; if no ancestor has one, it stays. A landmark moves with the oldest
-// keyframe that sees it.
+// keyframe that sees it: its normal turns, and its distances grow, so that it is looked for as before.
 void BendMap(const Corrections& corrections, MapEditor& editor);
 
 // Bends the map as the loop asks, and makes the two places one: the loop's keyframe sees the older place's landmarks,

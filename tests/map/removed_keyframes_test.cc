@@ -1,0 +1,115 @@
+#include "map/removed_keyframes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "map/map_editor.h"
+#include "map/small_maps.h"
+
+namespace tessera {
+namespace {
+
+const Sim3 kBend{1.7, ExpSO3({0.3, -0.2, 0.9}), {4.0, -1.0, 2.0}};  // new_world_from_old_world
+
+Sim3 PlaceOf(int64_t id, double scale) {
+  const auto step = static_cast<double>(id);
+  return Sim3::From({ExpSO3({0.1 * step, 0.05, -0.2 * step}), {step, 0.3 * step, 0.1}}, scale);
+}
+
+// Keyframes 0 <- 1 <- 2 <- 3, whose surroundings were enlarged by different factors.
+Map Chain() {
+  Map map;
+  MapEditor editor(map);
+  for (int64_t id = 0; id < 4; ++id) {
+    editor.AddKeyframe({id}, {id - 1}, PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)), PlainFeatures(id, 1));
+  }
+  (void)editor.Finish({3});
+  return map;
+}
+
+void ExpectNear(const Sim3& a, const Sim3& b) {
+  EXPECT_NEAR(a.scale, b.scale, 1e-12 * b.scale);
+  EXPECT_LT((a.translation - b.translation).norm(), 1e-12);
+  EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);
+}
+
+// The mapper's step: removes keyframes, whose children pass to their parents.
+MapDelta Remove(Map& map, const std::vector<KeyframeId>& ids, RemovedKeyframes& removed) {
+  MapDelta delta;
+  for (const KeyframeId id : ids) {
+    const KeyframeId parent = map.FindKeyframe(id)->parent;
+    map.keyframes().ForEach([&](KeyframeId child, const Keyframe& keyframe) {
+      if (keyframe.parent == id) delta.changed_parents.push_back({child, parent});
+    });
+    delta.removed_keyframes.push_back(id);
+  }
+  delta = WithHash(map, delta);
+  removed.Remember(map, delta);
+  EXPECT_EQ(map.Apply(delta), "");
+  return delta;
+}
+
+void Bend(Map& map, const Sim3& new_from_old) {
+  MapEditor editor(map);
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
+    editor.MoveKeyframe(id, new_from_old * keyframe.WorldFromKeyframe());
+  });
+  (void)editor.Finish({9});
+}
+
+TEST(RemovedKeyframes, StandWhereTheyStoodWhileTheMapRests) {
+  Map map = Chain();
+  RemovedKeyframes removed;
+  Remove(map, {{2}}, removed);
+  Remove(map, {{1}}, removed);
+  for (int64_t id = 0; id < 4; ++id) {
+    ASSERT_TRUE(removed.Find(map, {id}).has_value());
+    ExpectNear(*removed.Find(map, {id}), PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)));
+  }
+  EXPECT_EQ(removed.Successor(map, {2}), KeyframeId{0});
+  EXPECT_EQ(removed.Successor(map, {3}), KeyframeId{3});
+  EXPECT_FALSE(removed.Find(map, {7}).has_value());
+  EXPECT_FALSE(removed.Successor(map, {7}).valid());
+}
+
+TEST(RemovedKeyframes, GoAlongWhenTheMapIsBent) {
+  for (const bool at_once : {false, true}) {
+    Map map = Chain();
+    RemovedKeyframes removed;
+    if (at_once) {
+      Remove(map, {{1}, {2}}, removed);
+    } else {
+      Remove(map, {{1}}, removed);
+      Remove(map, {{2}}, removed);
+    }
+    Bend(map, kBend);
+    for (int64_t id = 1; id < 3; ++id) {
+      ExpectNear(*removed.Find(map, {id}), kBend * PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)));
+    }
+  }
+}
+
+// A frame's pose is stored relative to a keyframe, in its units of that time. What it saw then, it sees at the same
+// pixels after any bending, at a distance that grew with the place.
+TEST(RemovedKeyframes, APoseKeepsItsPlaceInItsSurroundings) {
+  Map map = Chain();
+  RemovedKeyframes removed;
+  const Rigid3 reference_from_camera{ExpSO3({0.0, 0.4, 0.1}), {0.5, -0.2, 0.7}};
+  const Eigen::Vector3d landmark(3.0, 1.0, 6.0);
+  for (const int64_t reference : {1, 3}) {
+    const Rigid3 before = (*removed.Find(map, {reference}) * reference_from_camera).Pose();
+    const Eigen::Vector3d seen_before = before.Inverse() * landmark;
+    Map bent = map;
+    RemovedKeyframes ties = removed;
+    if (reference == 1) Remove(bent, {{1}}, ties);
+    Bend(bent, kBend);
+    Bend(bent, kBend);
+    const Rigid3 after = (*ties.Find(bent, {reference}) * reference_from_camera).Pose();
+    const Eigen::Vector3d seen_after = after.Inverse() * (kBend * (kBend * landmark));
+    EXPECT_LT((seen_after - kBend.scale * kBend.scale * seen_before).norm(), 1e-9) << reference;
+  }
+}
+
+}  // namespace
+}  // namespace tessera
