@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -62,6 +63,49 @@ TEST(RunRecord, CountsFramesByWhatBecameOfThem) {
   EXPECT_EQ(counts.lost, 4);
   EXPECT_EQ(counts.dropped, 3);
   EXPECT_EQ(counts.tracking_failures, 2);
+}
+
+// Frames as in RecordOf, of which some were found again.
+FrameCounts CountsOf(const std::vector<TrackingState>& states, const std::vector<int64_t>& relocalized) {
+  RunRecord record;
+  for (size_t i = 0; i < states.size(); ++i) {
+    const auto frame = static_cast<int64_t>(i);
+    PoseEstimate pose = Pose(frame, states[i]);
+    pose.is_relocalized = std::find(relocalized.begin(), relocalized.end(), frame) != relocalized.end();
+    record.AddPose(pose, 5'000'000 + frame);
+  }
+  return record.Counts();
+}
+
+TEST(RunRecord, CountsLossesAndWhereTheCameraWasFoundAgain) {
+  const FrameCounts blinded = CountsOf({kTracked, kLost, kLost, kTracked, kTracked}, {3});
+  EXPECT_EQ(blinded.tracking_failures, 1);
+  EXPECT_EQ(blinded.relocalizations, 1);
+  EXPECT_EQ(blinded.lost, 2);
+  const FrameCounts carried = CountsOf({kTracked, kTracked, kTracked, kTracked}, {2});
+  EXPECT_EQ(carried.tracking_failures, 1) << "lost and found within one frame";
+  EXPECT_EQ(carried.relocalizations, 1);
+  EXPECT_EQ(carried.lost, 0);
+  const FrameCounts new_part = CountsOf({kTracked, kLost, kTracked, kTracked}, {});
+  EXPECT_EQ(new_part.tracking_failures, 1);
+  EXPECT_EQ(new_part.relocalizations, 0) << "another part of the map began";
+  const FrameCounts loaded = CountsOf({kLost, kTracked, kTracked}, {1});
+  EXPECT_EQ(loaded.tracking_failures, 0) << "it was not tracked before";
+  EXPECT_EQ(loaded.relocalizations, 1);
+}
+
+// A loop of mono enlarges what stands around a keyframe, and the way that frames are from it.
+TEST(RunRecord, FinalPosesGrowWithTheirSurroundings) {
+  RunRecord record;
+  MapDelta delta = NewKeyframe(0, -1, 0, At(1.0));
+  Apply(record, delta);
+  PoseEstimate pose = Pose(3, kTracked, 3.0);
+  pose.reference_keyframe = {0};
+  pose.reference_from_camera = At(2.0);
+  record.AddPose(pose, 5'000'000);
+  EXPECT_EQ(record.Trajectory().at(0).world_from_camera.translation.x(), 3.0);
+  Apply(record, {.moved_keyframes = {{{0}, At(10.0), 1.5}}});
+  EXPECT_EQ(record.Trajectory().at(0).world_from_camera.translation.x(), 13.0);
 }
 
 TEST(RunRecord, WithoutAnEndTheStagesTellOfDroppedFrames) {

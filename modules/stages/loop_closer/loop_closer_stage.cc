@@ -62,6 +62,8 @@ void LoopCloserStage::OnDeltas() {
 // would be void, so it is not looked for.
 void LoopCloserStage::FindLoop(const MapDelta& delta) {
   const KeyframeId id = delta.answers;
+  // Says nothing new, but to one that was started again since the loop was found.
+  if (!delta.is_snapshot && !delta.closed_loops.empty()) bends_at_ = id;
   const bool is_new = delta.is_snapshot || (!delta.new_keyframes.empty() && delta.new_keyframes.back().id == id);
   if (!id.valid() || !is_new) return;
   LoopResult result;
