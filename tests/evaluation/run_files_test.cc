@@ -107,7 +107,7 @@ TEST_F(RunFilesTest, WritesAllFilesAndLeavesNothingBeside) {
   }
   std::sort(names.begin(), names.end());
   EXPECT_EQ(names,
-            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "map.ply", "run.json",
+            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "loops.csv", "map.ply", "run.json",
                                       "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
 }
 
@@ -130,6 +130,25 @@ TEST_F(RunFilesTest, FramesCsvHasARowPerFrame) {
             "0,1403636584763555,initializing,,10.000,0.000,2000,50,40,900,0,0\n"
             "1,1403636584763556,tracked,4.000,14.000,0.000,2000,50,40,900,1,0\n"
             "2,1403636584763557,lost,4.000,18.000,6.000,2000,50,40,900,0,1\n");
+}
+
+TEST_F(RunFilesTest, LoopsCsvHasARowPerLoop) {
+  RunRecord record;
+  EXPECT_EQ(LoopsCsv(record), "keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n");
+  MapDelta delta{.closed_loops = {{{1}, {0}, 1.25, 87}}};
+  for (int64_t k = 0; k < 2; ++k) {
+    auto features = std::make_shared<FeatureFrame>();
+    features->utime_us = 1'403'636'584'763'555 + 90'000'000 * k;
+    delta.new_keyframes.push_back({{k}, {k - 1}, {}, features});
+  }
+  Map trial;
+  (void)trial.Apply(delta);
+  delta.hash = trial.hash();
+  ASSERT_EQ(record.ApplyDelta(delta), "");
+  EXPECT_EQ(LoopsCsv(record),
+            "keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n"
+            "1403636674.763555,1403636584.763555,87,1.250000\n");
+  EXPECT_EQ(nlohmann::json::parse(RunJson(record))["loops_closed"], 1);
 }
 
 TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {

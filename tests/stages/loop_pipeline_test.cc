@@ -36,7 +36,9 @@ int StepOf(int64_t frame) {
   return i < kNumFirst ? i : kFarStep - kStepsPerFrame * (i - kNumFirst);
 }
 
-Settings SettingsOf(const RunFolder& folder, const std::string& tiles) {
+using Overrides = std::vector<std::string>;
+
+Settings SettingsOf(const RunFolder& folder, const std::string& tiles, const Overrides& overrides) {
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
@@ -46,13 +48,14 @@ Settings SettingsOf(const RunFolder& folder, const std::string& tiles) {
   settings.Override("mapper.adjustment_delay_keyframes=4");
   settings.Override("loop_closer.vocabulary=" TESSERA_SOURCE_DIR "/config/vocabulary.tvoc");
   settings.Override("evaluator.out_dir=" + folder.path());
+  for (const std::string& text : overrides) settings.Override(text);
   return settings;
 }
 
 class LoopRun {
  public:
-  explicit LoopRun(const std::string& tiles = "1x1", int num_extractors = 1)
-      : bus_(SettingsOf(folder_, tiles)), camera_(bus_.AddContext("camera")) {
+  explicit LoopRun(const std::string& tiles = "1x1", int num_extractors = 1, const Overrides& overrides = {})
+      : bus_(SettingsOf(folder_, tiles, overrides)), camera_(bus_.AddContext("camera")) {
     frames_ = camera_.Advertise<CameraFrame>(kCameraChannel);
     calibration_ = camera_.Advertise<CameraCalibration>(kCalibrationChannel);
     end_ = camera_.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
@@ -125,7 +128,7 @@ class LoopRun {
 };
 
 // In the world of the first frame, wherever a frame belongs: without the loop, the second part would be ten metres off.
-void ExpectTruePlaces(const LoopRun& run) {
+void ExpectTruePlaces(const LoopRun& run, int64_t min_poses) {
   std::istringstream rows(run.folder().Read("trajectory.txt"));
   std::string comment;
   std::getline(rows, comment);
@@ -139,17 +142,23 @@ void ExpectTruePlaces(const LoopRun& run) {
     EXPECT_NEAR(std::hypot(y, z), 0.0, max_error_m) << step;
     ++num_poses;
   }
-  EXPECT_GE(num_poses, kNumFrames - 10);
+  EXPECT_GE(num_poses, min_poses);
+}
+
+// The run that all others are compared with. Its folder stays until the tests end.
+LoopRun& ReferenceRun() {
+  static LoopRun run;
+  return run;
 }
 
 const nlohmann::json& Reference() {
   static const nlohmann::json reference = [] {
-    LoopRun run;
+    LoopRun& run = ReferenceRun();
     nlohmann::json figures = run.Finish();
     EXPECT_FALSE(run.loops().empty());
     EXPECT_TRUE(!run.loops().empty() && run.loops().front().joins_parts);
     EXPECT_GT(run.num_usable_adjustments(), 0);
-    ExpectTruePlaces(run);
+    ExpectTruePlaces(run, kNumFrames - 10);
     return figures;
   }();
   return reference;
@@ -193,6 +202,39 @@ TEST(LoopPipeline, AMapperAndAnAdjusterThatAreStartedAgainMakeTheSameMap) {
   run.Restart<MapperStage>("mapper");
   run.Restart<GlobalAdjusterStage>("global_adjuster");
   ExpectSame(run.Finish());
+}
+
+// The file of the reference run's map, to be loaded.
+std::string LoadMap() {
+  EXPECT_FALSE(Reference().is_null());
+  return "mapper.load_map=" + ReferenceRun().folder().File("map.tessera");
+}
+
+TEST(LoopPipeline, ALoadedMapPlacesEveryFrameAndStaysAsItIs) {
+  LoopRun run("1x1", 1, {LoadMap(), "tracker.localize_only=true"});
+  const nlohmann::json figures = run.Finish();
+  ASSERT_FALSE(figures.is_null());
+  EXPECT_EQ(figures["frames_tracked"], kNumFrames);
+  EXPECT_EQ(figures["map_sha256"], Reference()["map_sha256"]);
+  EXPECT_TRUE(run.loops().empty());
+  ExpectTruePlaces(run, kNumFrames);
+}
+
+TEST(LoopPipeline, ALoadedMapIsGoneOnWithTheSameWhateverDies) {
+  LoopRun whole("1x1", 1, {LoadMap()});
+  const nlohmann::json figures = whole.Finish();
+  ASSERT_FALSE(figures.is_null());
+  EXPECT_EQ(figures["frames_tracked"], kNumFrames) << "it knows all these places";
+  ExpectTruePlaces(whole, kNumFrames);
+  LoopRun run("2x2", 2, {LoadMap()});
+  ASSERT_TRUE(run.Reach(50));
+  run.Restart<MapperStage>("mapper");
+  ASSERT_TRUE(run.Reach(80));
+  run.Restart<LoopCloserStage>("loop_closer");
+  const nlohmann::json again = run.Finish();
+  ASSERT_FALSE(again.is_null());
+  EXPECT_EQ(again["trajectory_sha256"], figures["trajectory_sha256"]);
+  EXPECT_EQ(again["map_sha256"], figures["map_sha256"]);
 }
 
 }  // namespace
