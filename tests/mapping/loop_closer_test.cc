@@ -189,6 +189,13 @@ TEST(LoopCloser, CulledKeyframesAreNoPlacesAnyMore) {
   const LoopResult loop = closer.FindLoop({2 * kVisit - 1});
   ASSERT_TRUE(loop.matched.valid()) << "its neighbours show the place as well";
   EXPECT_NE(loop.matched, matched);
+  MapEditor rest(planted.map());
+  for (int64_t k = 0; k < kVisit; ++k) {
+    if (planted.map().FindKeyframe({k}) != nullptr) rest.RemoveKeyframe({k});
+  }
+  ASSERT_EQ(closer.ApplyDelta(rest.Finish({2 * kVisit - 1})), "");
+  EXPECT_EQ(closer.FindLoop({2 * kVisit - 1}).num_candidates, 0);
+  EXPECT_EQ(closer.Relocalize({*planted.map().FindKeyframe({2 * kVisit - 1})->features, {}}).reference.value / kVisit, 1);
 }
 
 // A lost camera between two keyframes of the first visit.
