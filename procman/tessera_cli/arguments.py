@@ -3,6 +3,7 @@
 import argparse
 import os
 import re
+from pathlib import Path
 
 SOURCES = """\
 SOURCE is one of
@@ -27,6 +28,7 @@ examples:
 """
 
 
+COMMANDS = str(Path(__file__).resolve().parents[1] / "commands.pmd")
 # Of sim:street-short: once around the block and some 40 m of it again.
 DEMO_FRAMES = 593
 
@@ -199,6 +201,75 @@ def add_vocabulary_command(commands) -> None:
     info.add_argument("path", metavar="FILE")
 
 
+def add_keys_command(commands) -> None:
+    keys = add_command(commands, "keys", "lan.keys", "Whose orders the deputies of this user obey; lists them.",
+                       "examples:\n  procman/tessera keys\n  procman/tessera keys trust base 3q2+7w...=\n")
+    actions = keys.add_subparsers(metavar="list|make|trust|revoke", dest="action", parser_class=Parser)
+    actions.add_parser("list", help="this user's public key and all that are trusted; the default", allow_abbrev=False)
+    actions.add_parser("make", help="a new key instead of this user's own", allow_abbrev=False)
+    trust = actions.add_parser("trust", help="obey another's orders", allow_abbrev=False)
+    trust.add_argument("name", metavar="NAME", help="a name for it")
+    trust.add_argument("key", metavar="KEY", help="what `tessera keys` shows there")
+    revoke = actions.add_parser("revoke", help="obey them no longer", allow_abbrev=False)
+    revoke.add_argument("name", metavar="NAME")
+
+
+def add_lan_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--lan", action="store_true",
+                        help="speak to the network (ttl 1), not to this machine alone; TESSERA_LAN=1 in the environment does the same")
+    add_port(parser)
+
+
+def add_timeout(parser: argparse.ArgumentParser, seconds: int) -> None:
+    parser.add_argument("--timeout", type=whole_number(1, 86400), metavar="S", default=seconds, help=f"seconds to wait, default {seconds}")
+
+
+def add_lan_command(commands, name: str, module: str, summary: str, epilog: str) -> argparse.ArgumentParser:
+    parser = add_command(commands, name, module, summary, epilog)
+    parser.set_defaults(command=name)
+    add_lan_options(parser)
+    return parser
+
+
+def add_deputy_command(commands) -> None:
+    deputy = add_lan_command(
+        commands, "deputy", "lan.deputy", "Runs on each node: starts, watches and ends processes that signed orders name.",
+        "It goes on with its last order when it is started again. Ctrl-C or SIGTERM ends it and all its processes.\n\nexamples:\n"
+        "  procman/tessera deputy\n  procman/tessera deputy --id node2 --lan\n")
+    deputy.add_argument("--id", metavar="NAME", help="default: the name of this machine")
+    deputy.add_argument("--commands", metavar="FILE", default=COMMANDS, help="what it may execute, by name; default procman/commands.pmd")
+    deputy.add_argument("--folder", metavar="DIR", help="its logs and last order, default logs/deputies/<id>-<port>")
+    deputy.add_argument("--fresh", action="store_true", help="don't go on with the last order")
+
+
+def add_sheriff_commands(commands) -> None:
+    up = add_lan_command(
+        commands, "up", "lan.commands", "Starts the processes of a list on their nodes and waits until all are ready.",
+        "Exit status: 0 all are ready (or the script ended well), 1 one can't or not in time, 2 the list or the arguments are at fault.\n\n"
+        "examples:\n  procman/tessera up procman/local.pmd --set camera.source=kitti:DIR --out /tmp/run\n"
+        "  procman/tessera up procman/lan.pmd --lan --script run --set camera.source=kitti:DIR --out /tmp/run\n")
+    up.add_argument("file", metavar="FILE", help="a process list, such as procman/lan.pmd")
+    up.add_argument("--script", metavar="NAME", help="carry out this script of the list instead")
+    up.add_argument("--out", metavar="DIR", help="the run's folder, on the node of the evaluator")
+    up.add_argument("--set", dest="settings", type=assignment, metavar="section.key=value", action="append", default=[],
+                    help="any setting of config/default.yaml; may be repeated")
+    add_timeout(up, 60)
+    down = add_lan_command(commands, "down", "lan.commands", "Stops all processes of all deputies.", "examples:\n  procman/tessera down\n")
+    add_timeout(down, 60)
+    status = add_lan_command(commands, "status", "lan.commands", "Nodes and processes, once; exit status 1 if one failed.",
+                             "examples:\n  procman/tessera status --json\n")
+    status.add_argument("--json", action="store_true", help="for programs")
+    restart = add_lan_command(commands, "restart", "lan.commands", "Ends a process and starts it again; waits until it is ready.",
+                              "examples:\n  procman/tessera restart mapper\n")
+    restart.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")
+    add_timeout(restart, 60)
+    log = add_lan_command(commands, "log", "lan.commands", "The last lines that a process wrote, from its node.",
+                          "examples:\n  procman/tessera log tracker --follow\n")
+    log.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")
+    log.add_argument("--lines", type=whole_number(1, 10000), metavar="N", default=50, help="default 50")
+    log.add_argument("--follow", action="store_true", help="and what it writes from now on, until Ctrl-C")
+
+
 def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     parser = Parser(prog="procman/tessera", description="A distributed visual SLAM stack over LCM.", allow_abbrev=False)
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
@@ -206,4 +277,7 @@ def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     add_run_commands(commands)
     add_look_commands(commands)
     add_vocabulary_command(commands)
+    add_deputy_command(commands)
+    add_sheriff_commands(commands)
+    add_keys_command(commands)
     return parser.parse_args(arguments)

@@ -1,0 +1,84 @@
+"""One running process of a deputy: started with its limits, its output read, its whole tree ended."""
+
+import ctypes
+import os
+import signal
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from tessera_cli.lan.process_list import RunOptions
+from tessera_cli.lan.tree import MARK, kill_marked, marked
+
+_PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None, use_errno=True)
+READ_BYTES = 65536
+
+
+@dataclass(frozen=True)
+class Launch:
+    """What is executed; two equal ones need no new process."""
+
+    words: tuple[str, ...]
+    folder: Path
+    environment: tuple[tuple[str, str], ...]
+    command: str
+    depends: tuple[str, ...]
+    options: RunOptions
+    run: str        # digest of the settings
+    generation: int  # another one, another process
+
+
+def _prepare(parent: int, options: RunOptions) -> None:
+    """Runs in the child before exec."""
+    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+    if options.nice:
+        os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + options.nice)
+    if options.cpus:
+        os.sched_setaffinity(0, options.cpus)
+
+
+class Child:
+    def __init__(self, launch: Launch, mark: str):
+        """Raises OSError or subprocess.SubprocessError (a nice value or CPU that the kernel refuses)."""
+        parent = os.getpid()
+        self._mark = mark
+        self._popen = subprocess.Popen(
+            launch.words, cwd=launch.folder, env={**os.environ, **dict(launch.environment), MARK: mark}, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=lambda: _prepare(parent, launch.options))
+        os.set_blocking(self._popen.stdout.fileno(), False)
+        self.pid = self._popen.pid
+
+    def fileno(self) -> int:
+        return self._popen.stdout.fileno()
+
+    def read(self) -> bytes:
+        """What it wrote since; empty if nothing."""
+        try:
+            return os.read(self.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return b""
+
+    def poll(self) -> int | None:
+        """Exit status, negative: by that signal; None while it runs."""
+        return self._popen.poll()
+
+    def ask_to_end(self, number: int) -> None:
+        """Its whole group, as a terminal would."""
+        try:
+            os.killpg(self.pid, number)
+        except ProcessLookupError:
+            pass
+
+    def has_descendants(self) -> bool:
+        return bool(marked(self._mark))
+
+    def end(self) -> None:
+        """Kills what is left of the tree."""
+        kill_marked(self._mark)
+        self._popen.wait()
+
+    def close(self) -> None:
+        self._popen.stdout.close()

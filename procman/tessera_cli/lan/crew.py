@@ -1,0 +1,99 @@
+"""All processes of one deputy, and what it knows of those of other deputies that they wait for."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from tessera_cli.lan.child import Child, Launch
+from tessera_cli.lan.log_file import RotatingLog
+from tessera_cli.lan.state_folder import StateFolder
+from tessera_cli.lan.supervised import READY, Supervised
+from tessera_cli.lan.tree import Trees
+from tessera_cli.types import procman_process_t, procman_status_t
+
+USAGE_PERIOD_S = 1.0
+# Deputies speak once a second; one that was not heard for longer may be gone, and its processes with it.
+OTHERS_STALE_AFTER_S = 5.0
+
+
+class Crew:
+    def __init__(self, folder: StateFolder, on_output: Callable[[str, bytes], None]):
+        self._folder, self._on_output = folder, on_output
+        self._members: dict[str, Supervised] = {}
+        self._others: dict[str, tuple[int, float]] = {}  # (state, when heard)
+        self._trees = Trees()
+        self._usage_at = 0.0
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._members)
+
+    @property
+    def processes(self) -> list[Supervised]:
+        return list(self._members.values())
+
+    @property
+    def children(self) -> list[Child]:
+        return [member.child for member in self._members.values() if member.child]
+
+    @property
+    def is_idle(self) -> bool:
+        return all(member.is_idle for member in self._members.values())
+
+    @property
+    def facts(self) -> tuple:
+        """What others want to know at once when it changes."""
+        return tuple((member.name, member.state, member.reason, member.num_starts) for member in self._members.values())
+
+    def generations(self, run: str) -> dict[str, int]:
+        return {name: member.wanted.generation for name, member in self._members.items() if member.wanted and member.wanted.run == run}
+
+    def want(self, launches: dict[str, Launch], session: str) -> None:
+        """Exactly these; the others are ended. Those that ended before are forgotten."""
+        self._members = {name: member for name, member in self._members.items() if name in launches or not member.is_idle}
+        for name in [name for name in launches if name not in self._members]:
+            log = RotatingLog(self._folder.log_path(name))
+            self._members[name] = Supervised(name, self._folder.mark(name), log, self._on_output)
+        for name, member in self._members.items():
+            member.want(launches.get(name), session)
+
+    def restart(self, name: str, generation: int) -> None:
+        member = self._members[name]
+        if member.wanted:
+            member.want(replace(member.wanted, generation=generation), member.session)
+
+    def tail(self, name: str, num_lines: int) -> str:
+        return self._members[name].log.tail(num_lines)
+
+    def on_stage_status(self, name: str, pid: int, is_finished: bool, now: float) -> None:
+        member = self._members.get(name)
+        if member and member.child and pid in {member.child.pid, *member.usage.pids}:
+            member.on_stage_status(is_finished, now)
+
+    def hear_of_others(self, status: procman_status_t, now: float) -> None:
+        for process in status.processes:
+            if process.name not in self._members:
+                self._others[process.name] = (process.state, now)
+
+    def forget_others(self) -> None:
+        self._others.clear()
+
+    def step(self, now: float) -> None:
+        if now - self._usage_at >= USAGE_PERIOD_S:
+            self._usage_at = now
+            self._measure(now)
+        needed = {name for member in self._members.values() if member.child for name in member.depends}
+        for member in self._members.values():
+            member.step(now, self._is_not_ready, member.name in needed)
+
+    def _measure(self, now: float) -> None:
+        usages = self._trees.snapshot([child.pid for child in self.children], now)
+        for member in self._members.values():
+            if member.child and member.child.pid in usages:
+                member.usage = usages[member.child.pid]
+
+    def _is_not_ready(self, name: str) -> bool:
+        if member := self._members.get(name):
+            return member.state not in READY
+        state, heard_at = self._others.get(name, (procman_process_t.STOPPED, 0.0))
+        return state not in READY or time.monotonic() - heard_at > OTHERS_STALE_AFTER_S

@@ -1,0 +1,137 @@
+"""tessera keys: who may give orders. Ed25519, by PyNaCl.
+
+The folder ~/.config/tessera (or TESSERA_KEYS) holds `sheriff.key`, this user's secret key, and `trusted_keys`, rows of
+NAME PUBLIC-KEY whose orders a deputy of this user obeys. Both are made when first needed, with the user's own key as the
+first one trusted: on one machine there is nothing to set up.
+"""
+
+import base64
+import binascii
+import os
+import re
+from argparse import Namespace
+from pathlib import Path
+
+from nacl.signing import SigningKey
+
+from tessera_cli.errors import UserError
+from tessera_cli.files import write_text
+
+KEY_BYTES = 32
+OWN_NAME = "me"
+NAME = re.compile(r"[A-Za-z0-9_.@-]{1,64}")
+
+
+def main(arguments: Namespace) -> int:
+    ring = KeyRing(key_folder())
+    match arguments.action:
+        case "trust":
+            ring.trust(arguments.name, arguments.key)
+            print(f"tessera: deputies of this user now obey {arguments.name}.")
+        case "revoke":
+            ring.revoke(arguments.name)
+            print(f"tessera: deputies of this user no longer obey {arguments.name}.")
+        case "make":
+            ring.make()
+            print(f"tessera: a new key is in {ring.secret_path}; the old one is no longer trusted here.")
+    _print(ring)
+    return 0
+
+
+def _print(ring: "KeyRing") -> None:
+    print(f"this user's orders are signed with  {to_text(ring.signing_key().verify_key.encode())}")
+    print("orders obeyed by deputies of this user:")
+    for name, key in ring.trusted().items():
+        print(f"  {name:16s} {to_text(key)}")
+    print("To be obeyed on another node, do there: procman/tessera keys trust NAME KEY")
+
+
+def key_folder() -> Path:
+    if folder := os.environ.get("TESSERA_KEYS"):
+        return Path(folder)
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "tessera"
+
+
+def to_text(key: bytes) -> str:
+    return base64.b64encode(key).decode()
+
+
+def from_text(text: str) -> bytes:
+    """Raises ValueError if it is no key."""
+    try:
+        key = base64.b64decode(text, validate=True)
+    except binascii.Error as error:
+        raise ValueError("it is not base64") from error
+    if len(key) != KEY_BYTES:
+        raise ValueError(f"it has {len(key)} bytes instead of {KEY_BYTES}")
+    return key
+
+
+class KeyRing:
+    def __init__(self, folder: Path):
+        self.secret_path = folder / "sheriff.key"
+        self.trusted_path = folder / "trusted_keys"
+
+    def signing_key(self) -> SigningKey:
+        """Made at the first call."""
+        if not self.secret_path.exists():
+            self.make()
+        if self.secret_path.stat().st_mode & 0o077:
+            raise UserError(f"{self.secret_path} can be read by others; do: chmod 600 {self.secret_path}")
+        return SigningKey(self._parse(self.secret_path.read_text().strip(), str(self.secret_path)))
+
+    def make(self) -> None:
+        """A new key, trusted instead of the old one."""
+        key = SigningKey.generate()
+        try:
+            self.secret_path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            self.secret_path.unlink(missing_ok=True)
+            descriptor = os.open(self.secret_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        except OSError as error:
+            raise UserError(f"the key {self.secret_path} can't be written: {error.strerror}.") from error
+        with os.fdopen(descriptor, "w") as file:
+            file.write(to_text(key.encode()) + "\n")
+        self._write({**self._read(), OWN_NAME: key.verify_key.encode()})
+
+    def trusted(self) -> dict[str, bytes]:
+        """Public keys by name; this user's own is among them unless it was revoked."""
+        if not self.secret_path.exists() and not self.trusted_path.exists():
+            self.make()
+        return self._read()
+
+    def trust(self, name: str, text: str) -> None:
+        if not NAME.fullmatch(name):
+            raise UserError(f"the name '{name}' must have letters, digits, _ . @ and - only.")
+        self._write({**self.trusted(), name: self._parse(text, "the key given")})
+
+    def revoke(self, name: str) -> None:
+        keys = self.trusted()
+        if keys.pop(name, None) is None:
+            raise UserError(f"no key of the name '{name}' is trusted; there are: {', '.join(keys) or 'none'}.")
+        self._write(keys)
+
+    def _read(self) -> dict[str, bytes]:
+        if not self.trusted_path.exists():
+            return {}
+        keys = {}
+        for number, line in enumerate(self.trusted_path.read_text().splitlines(), start=1):
+            words = line.partition("#")[0].split()
+            if words and len(words) != 2:
+                raise UserError(f"{self.trusted_path}:{number}: a row must be NAME KEY.")
+            if words:
+                keys[words[0]] = self._parse(words[1], f"{self.trusted_path}:{number}")
+        return keys
+
+    def _write(self, keys: dict[str, bytes]) -> None:
+        try:
+            self.trusted_path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            write_text(self.trusted_path, "".join(f"{name} {to_text(key)}\n" for name, key in keys.items()))
+        except OSError as error:
+            raise UserError(f"{self.trusted_path} can't be written: {error.strerror}.") from error
+
+    @staticmethod
+    def _parse(text: str, where: str) -> bytes:
+        try:
+            return from_text(text)
+        except ValueError as error:
+            raise UserError(f"{where}: this is no Ed25519 key: {error}.") from error

@@ -1,0 +1,37 @@
+"""What a deputy says of itself."""
+
+import os
+
+import psutil
+
+from tessera_cli.lan.orders import Gate
+from tessera_cli.lan.supervised import Supervised
+from tessera_cli.types import header_t, procman_process_t, procman_status_t
+
+MAX_REASON = 300
+
+
+def make_status(header: header_t, gate: Gate, members: list[Supervised], now: float) -> procman_status_t:
+    """All but what depends on the last order. `now`: monotonic seconds."""
+    status = procman_status_t()
+    status.header = header
+    status.deputy, status.host, status.nonce = gate.deputy, os.uname().nodename, gate.nonce
+    status.last_number, status.num_obeyed, status.num_for_others = gate.last_number, gate.num_passed, gate.num_for_others
+    status.kinds = sorted(gate.refused)
+    status.num_kinds = len(status.kinds)
+    status.num_refused = [gate.refused[kind] for kind in status.kinds]
+    status.cpu_percent, status.memory_percent = psutil.cpu_percent(), psutil.virtual_memory().percent
+    status.processes = [_describe(member, now) for member in members]
+    status.num_processes = len(status.processes)
+    return status
+
+
+def _describe(member: Supervised, now: float) -> procman_process_t:
+    process = procman_process_t()
+    process.name, process.state, process.reason = member.name, member.state, member.reason[:MAX_REASON].replace("\0", "")
+    process.command = member.wanted.command if member.wanted else ""
+    process.num_starts = member.num_starts
+    if member.child:
+        process.pid, process.up_s = member.child.pid, now - member.started_at
+        process.cpu_percent, process.rss_mb = member.usage.cpu_percent, member.usage.rss_mb
+    return process

@@ -1,0 +1,86 @@
+"""Trees of processes: what they use, and how they are ended to the last one.
+
+Every process that a deputy starts carries a mark in its environment, which its descendants inherit. So they are found
+also when their parents are gone, whatever sessions and groups they made.
+"""
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+MARK = "TESSERA_PROCESS"  # its value: <deputy's folder>/<process>
+KILL_TIMEOUT_S = 5.0
+
+
+def marked(value: str) -> list[int]:
+    """Processes with this mark; a value that ends in "/" stands for all that begin with it."""
+    start = f"\0{MARK}={value}".encode() + (b"" if value.endswith("/") else b"\0")
+    found = []
+    for name in os.listdir("/proc"):
+        if name.isdecimal() and int(name) != os.getpid():
+            try:
+                environment = b"\0" + Path(f"/proc/{name}/environ").read_bytes() + b"\0"
+            except OSError:
+                continue
+            if start in environment:
+                found.append(int(name))
+    return found
+
+
+def kill_marked(value: str) -> bool:
+    """Kills until none is left, also those that are born meanwhile. False if some can't be killed."""
+    deadline = time.monotonic() + KILL_TIMEOUT_S
+    while pids := marked(value):
+        for pid in pids:
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except OSError:
+                pass
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+@dataclass
+class Usage:
+    """Of a whole tree."""
+
+    pids: frozenset[int] = frozenset()
+    cpu_percent: float = 0.0  # since the snapshot before; 100 is one core
+    rss_mb: float = 0.0       # 10^6 bytes
+
+
+class Trees:
+    """Reads all processes of the machine once a snapshot."""
+
+    def __init__(self):
+        self._cpu_s: dict[int, float] = {}
+        self._taken_at = 0.0
+
+    def snapshot(self, roots: list[int], now: float) -> dict[int, Usage]:
+        """`now`: monotonic seconds."""
+        children: dict[int, list[int]] = {}
+        for process in psutil.process_iter(["ppid"]):
+            children.setdefault(process.info["ppid"], []).append(process.pid)
+        elapsed_s = now - self._taken_at
+        before, self._cpu_s, self._taken_at = self._cpu_s, {}, now
+        return {root: self._usage(root, children, before, elapsed_s) for root in roots}
+
+    def _usage(self, root: int, children: dict[int, list[int]], before: dict[int, float], elapsed_s: float) -> Usage:
+        pids, rss_bytes, cpu_s = [root], 0, 0.0
+        for pid in pids:
+            pids += children.get(pid, [])
+            try:
+                process = psutil.Process(pid)
+                times = process.cpu_times()
+                rss_bytes += process.memory_info().rss
+            except psutil.Error:
+                continue
+            self._cpu_s[pid] = times.user + times.system
+            cpu_s += self._cpu_s[pid] - before.get(pid, self._cpu_s[pid])
+        return Usage(frozenset(pids), 100 * cpu_s / elapsed_s if elapsed_s > 0 else 0.0, rss_bytes / 1e6)

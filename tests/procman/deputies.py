@@ -1,0 +1,100 @@
+"""Deputies as a user starts them, with keys of their own. Makes the command's Python package importable."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "procman"))
+
+
+@pytest.fixture(autouse=True)
+def own_keys(tmp_path, monkeypatch) -> Path:
+    folder = tmp_path / "keys"
+    monkeypatch.setenv("TESSERA_KEYS", str(folder))
+    return folder
+
+
+TIMEOUT_S = 60
+# Beside each other on one machine, two test suites take different ports.
+FIRST_PORT = 62000 + (os.getpid() % 50) * 50
+
+
+class Node:
+    """A deputy with an id, a port and a folder, and whoever orders it."""
+
+    def __init__(self, folder: Path, port: int, commands: str, deputy: str = "node1"):
+        self.folder, self.port, self.deputy = folder, port, deputy
+        self._commands = folder / "commands.pmd"
+        self._commands.write_text(commands)
+        self.process: subprocess.Popen | None = None
+
+    def start(self, *options) -> "Node":
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tessera_cli", "deputy", "--id", self.deputy, "--port", str(self.port), "--folder", self.folder / "state",
+             "--commands", self._commands, *options], env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, text=True)
+        self.process.stdout.readline()  # it says that it is there
+        return self
+
+    def end(self) -> int:
+        self.process.terminate()
+        return self.process.wait(TIMEOUT_S)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait(TIMEOUT_S)
+
+    def marked(self) -> list[int]:
+        from tessera_cli.lan.tree import marked
+
+        return marked(f"{self.folder / 'state'}/")
+
+    def command(self, *arguments) -> subprocess.CompletedProcess:
+        return subprocess.run([sys.executable, "-m", "tessera_cli", *map(str, arguments), "--port", str(self.port)], env=environment(),
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIMEOUT_S)
+
+    def up(self, text: str, *options) -> subprocess.CompletedProcess:
+        path = self.folder / "list.pmd"
+        path.write_text(text)
+        return self.command("up", path, *options)
+
+    def status(self) -> dict:
+        return json.loads(self.command("status", "--json").stdout)[self.deputy]
+
+    def processes(self) -> dict:
+        return self.status()["processes"]
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT / "procman")}
+
+
+def wait_for(condition, what: str) -> None:
+    deadline = time.monotonic() + TIMEOUT_S
+    while not condition():
+        assert time.monotonic() < deadline, f"waited in vain for {what}"
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def make_node(tmp_path, own_keys):
+    """Makes nodes whose deputies end with the test."""
+    nodes = []
+
+    def make(commands: str, **options) -> Node:
+        Node.num_made = getattr(Node, "num_made", 0) + (0 if options else 1)
+        folder = tmp_path / f"node {len(nodes)}"
+        folder.mkdir()
+        nodes.append(Node(folder, FIRST_PORT + 4 * (Node.num_made % 12), commands, **options))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        if node.process and node.process.poll() is None:
+            node.end()
