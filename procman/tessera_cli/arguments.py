@@ -177,7 +177,7 @@ def add_look_commands(commands) -> None:
     experiment.add_argument("sources", metavar="SOURCE", nargs="*", help="places, worlds: with ground truth, instead of those it has itself")
     spy = add_command(commands, "spy", "spy", "lcm-spy with Tessera's message types.",
                       "examples:\n  procman/tessera spy --bus camera\n")
-    spy.add_argument("--bus", choices=("main", "camera", "work"), default="main", help="default main")
+    spy.add_argument("--bus", choices=("main", "camera", "work", "procman"), default="main", help="default main")
     add_port(spy)
 
 
@@ -259,6 +259,9 @@ def add_sheriff_commands(commands) -> None:
     status = add_lan_command(commands, "status", "lan.commands", "Nodes and processes, once; exit status 1 if one failed.",
                              "examples:\n  procman/tessera status --json\n")
     status.add_argument("--json", action="store_true", help="for programs")
+    watch = add_lan_command(commands, "watch", "lan.watch", "Nodes, processes, frame rate and output, drawn anew until Ctrl-C.",
+                            "examples:\n  procman/tessera watch\n")
+    watch.add_argument("--prefix", metavar="TEXT", default="", help="the channel prefix of the stack whose poses are counted")
     restart = add_lan_command(commands, "restart", "lan.commands", "Ends a process and starts it again; waits until it is ready.",
                               "examples:\n  procman/tessera restart mapper\n")
     restart.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")

@@ -8,7 +8,7 @@ from tessera_cli.errors import RunFailed
 from tessera_cli.files import BUILD, ROOT
 from tessera_cli.settings import bus_url
 
-PORT_OFFSETS = {"main": 0, "camera": 1, "work": 2}
+PORT_OFFSETS = {"main": 0, "camera": 1, "work": 2, "procman": 3}
 
 
 def main(arguments: Namespace) -> int:

@@ -20,25 +20,32 @@ def own_keys(tmp_path, monkeypatch) -> Path:
     return folder
 
 
-TIMEOUT_S = 60
+# Nothing here takes long; a hang must not take the whole suite along.
+TIMEOUT_S = 120
 # Beside each other on one machine, two test suites take different ports.
-FIRST_PORT = 62000 + (os.getpid() % 50) * 50
+PORTS_PER_NODE = 25
+FIRST_PORT = 61000 + (os.getpid() % 7) * 20 * PORTS_PER_NODE
 
 
 class Node:
-    """A deputy with an id, a port and a folder, and whoever orders it."""
+    """A deputy with an id, a port and a folder, and whoever orders it from the same node. `prefix`: words before each command."""
 
-    def __init__(self, folder: Path, port: int, commands: str, deputy: str = "node1"):
+    def __init__(self, folder: Path, port: int, commands: str = "", deputy: str = "node1", prefix: tuple = (), is_lan: bool = False):
         self.folder, self.port, self.deputy = folder, port, deputy
-        self._commands = folder / "commands.pmd"
-        self._commands.write_text(commands)
+        self._prefix, self._lan = prefix, ["--lan"] if is_lan else []
+        self.commands_path = ROOT / "procman" / "commands.pmd"
+        if commands:
+            self.commands_path = folder / "commands.pmd"
+            self.commands_path.write_text(commands)
         self.process: subprocess.Popen | None = None
 
-    def start(self, *options) -> "Node":
+    def line(self, *words) -> list[str]:
+        return [*self._prefix, sys.executable, "-m", "tessera_cli", *map(str, words), "--port", str(self.port), *self._lan]
+
+    def start(self) -> "Node":
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tessera_cli", "deputy", "--id", self.deputy, "--port", str(self.port), "--folder", self.folder / "state",
-             "--commands", self._commands, *options], env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True)
+            self.line("deputy", "--id", self.deputy, "--folder", self.folder / "state", "--commands", self.commands_path),
+            env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.process.stdout.readline()  # it says that it is there
         return self
 
@@ -56,8 +63,8 @@ class Node:
         return marked(f"{self.folder / 'state'}/")
 
     def command(self, *arguments) -> subprocess.CompletedProcess:
-        return subprocess.run([sys.executable, "-m", "tessera_cli", *map(str, arguments), "--port", str(self.port)], env=environment(),
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIMEOUT_S)
+        return subprocess.run(self.line(*arguments), env=environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              timeout=TIMEOUT_S)
 
     def up(self, text: str, *options) -> subprocess.CompletedProcess:
         path = self.folder / "list.pmd"
@@ -82,16 +89,19 @@ def wait_for(condition, what: str) -> None:
         time.sleep(0.02)
 
 
+next_node = [0]
+
+
 @pytest.fixture
 def make_node(tmp_path, own_keys):
     """Makes nodes whose deputies end with the test."""
     nodes = []
 
-    def make(commands: str, **options) -> Node:
-        Node.num_made = getattr(Node, "num_made", 0) + (0 if options else 1)
+    def make(commands: str = "", **options) -> Node:
+        next_node[0] += 1
         folder = tmp_path / f"node {len(nodes)}"
         folder.mkdir()
-        nodes.append(Node(folder, FIRST_PORT + 4 * (Node.num_made % 12), commands, **options))
+        nodes.append(Node(folder, options.pop("port", FIRST_PORT + PORTS_PER_NODE * (next_node[0] % 20)), commands, **options))
         return nodes[-1]
 
     yield make

@@ -110,9 +110,7 @@ def test_one_waits_for_another_and_says_for_whom(make_node):
 
 def test_readiness_is_awaited_across_nodes(make_node):
     one = make_node(COMMANDS).start()
-    two = make_node(COMMANDS, deputy="node2")
-    two.port = one.port
-    two.start()
+    two = make_node(COMMANDS, deputy="node2", port=one.port).start()
     up = one.up(listed("sleeper", host="node2") + listed("talker", more='depends = "sleeper";'))
     assert up.returncode == 0 and "2 processes on 2 nodes" in up.stdout, up.stderr
     assert list(one.processes()) == ["talker"] and list(two.processes()) == ["sleeper"]
@@ -138,11 +136,9 @@ def test_a_host_without_a_deputy_and_a_second_deputy_with_one_id_are_told(make_n
     node = make_node(COMMANDS).start()
     up = node.up(listed("sleeper", host="node7"))
     assert up.returncode == 2 and "no deputy answers for node7; there is: node1" in up.stderr
-    twin = make_node(COMMANDS, deputy="node1")
-    twin.port = node.port
-    finished = twin.command("deputy", "--id", "node1", "--folder", twin.folder / "state", "--commands", twin.folder / "commands.pmd")
+    finished = node.command("deputy", "--id", "node1", "--folder", node.folder / "other")
     assert finished.returncode == 2 and "a deputy with the id node1 runs on" in finished.stderr
-    same = node.command("deputy", "--id", "node1", "--folder", node.folder / "state", "--commands", node.folder / "commands.pmd")
+    same = node.command("deputy", "--id", "node1", "--folder", node.folder / "state")
     assert same.returncode == 2 and "runs on this machine already" in same.stderr
 
 

@@ -7,7 +7,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from tessera_cli.lan.process_list import RunOptions
+from tessera_cli.lan.attributes import RunOptions
 from tessera_cli.lan.tree import MARK, kill_marked, marked
 
 _PR_SET_PDEATHSIG = 1

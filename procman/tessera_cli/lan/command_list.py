@@ -12,7 +12,8 @@ from pathlib import Path
 
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT
-from tessera_cli.lan.process_list import read_attributes, require_name
+from tessera_cli.lan.attributes import read_attributes
+from tessera_cli.lan.process_list import require_name
 from tessera_cli.lan.syntax import Block, read_blocks
 
 PLACEHOLDER = re.compile(r"\$\{([^}]*)\}")

@@ -11,7 +11,8 @@ from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.lan.process_list import ProcessList, read_process_list
 from tessera_cli.lan.procman_bus import ttl_of
 from tessera_cli.lan.script import ScriptRunner
-from tessera_cli.lan.sheriff import STATE_NAMES, TURN_S, Sheriff
+from tessera_cli.lan.sheriff import TURN_S, Sheriff
+from tessera_cli.lan.supervised import STATE_NAMES
 from tessera_cli.types import procman_order_t, procman_output_t, procman_process_t
 
 # A message that fits one packet of a LAN: the loss of a fragment would lose it whole.
@@ -85,7 +86,7 @@ def status(arguments: Namespace) -> int:
     if arguments.json:
         print(json.dumps(_as_json(sheriff), indent=2))
     else:
-        _print_status(sheriff)
+        print_status(sheriff)
     return int(any(process.state == procman_process_t.FAILED for _, process in sheriff.processes().values()))
 
 
@@ -98,7 +99,7 @@ def _as_json(sheriff: Sheriff) -> dict:
             for deputy, heard in sorted(sheriff.deputies.items())}
 
 
-def _print_status(sheriff: Sheriff) -> None:
+def print_status(sheriff: Sheriff) -> None:
     for deputy, heard in sorted(sheriff.deputies.items()):
         refused = sum(heard.status.num_refused)
         print(f"{deputy} ({heard.status.host}): CPU {heard.status.cpu_percent:.0f} %, memory {heard.status.memory_percent:.0f} %, "

@@ -7,7 +7,7 @@ from dataclasses import replace
 from tessera_cli.lan.child import Child, Launch
 from tessera_cli.lan.log_file import RotatingLog
 from tessera_cli.lan.state_folder import StateFolder
-from tessera_cli.lan.supervised import READY, Supervised
+from tessera_cli.lan.supervised import READY, STATE_NAMES, Supervised
 from tessera_cli.lan.tree import Trees
 from tessera_cli.types import procman_process_t, procman_status_t
 
@@ -23,6 +23,7 @@ class Crew:
         self._others: dict[str, tuple[int, float]] = {}  # (state, when heard)
         self._trees = Trees()
         self._usage_at = 0.0
+        self._told: dict[str, str] = {}
 
     @property
     def names(self) -> list[str]:
@@ -44,6 +45,14 @@ class Crew:
     def facts(self) -> tuple:
         """What others want to know at once when it changes."""
         return tuple((member.name, member.state, member.reason, member.num_starts) for member in self._members.values())
+
+    def news(self) -> list[str]:
+        """A sentence for each process whose state has changed."""
+        now = {member.name: f"{member.name} is {STATE_NAMES[member.state]}" + (f": {member.reason}" if member.reason else "")
+               for member in self._members.values()}
+        changed = [sentence for name, sentence in now.items() if self._told.get(name) != sentence]
+        self._told = now
+        return changed
 
     def generations(self, run: str) -> dict[str, int]:
         return {name: member.wanted.generation for name, member in self._members.items() if member.wanted and member.wanted.run == run}

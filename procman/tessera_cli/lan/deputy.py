@@ -16,12 +16,12 @@ from tessera_cli import settings
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BIN, ROOT
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.lan.attributes import HOST
 from tessera_cli.lan.command_list import read_command_list
 from tessera_cli.lan.crew import Crew
 from tessera_cli.lan.keys import KeyRing, key_folder
 from tessera_cli.lan.orders import Gate
 from tessera_cli.lan.output import OutputForwarder
-from tessera_cli.lan.process_list import HOST
 from tessera_cli.lan.procman_bus import ORDER, STATUS, Bus, procman_url
 from tessera_cli.lan.report import make_status
 from tessera_cli.lan.state_folder import StateFolder
@@ -114,6 +114,8 @@ class Deputy:
         self._crew.step(now)
         self._output.flush(now)
         facts = (self._last_order, self._last_refusal, self._crew.facts)
+        for sentence in self._crew.news():
+            self._say(sentence)
         if facts != self._told or now - self._status_at >= STATUS_PERIOD_S:
             self._told = facts
             self._publish_status()

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from tessera_cli.errors import RunFailed
 from tessera_cli.lan.orders import draw_order_id
 from tessera_cli.lan.process_list import Process, ProcessList, ScriptStep
-from tessera_cli.lan.sheriff import STATE_NAMES, TURN_S, Sheriff
+from tessera_cli.lan.sheriff import TURN_S, Sheriff
+from tessera_cli.lan.supervised import STATE_NAMES
 from tessera_cli.types import procman_order_t, procman_process_t as states
 
 # States that fulfil a wait. (What no deputy knows of is stopped.)

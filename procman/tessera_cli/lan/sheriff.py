@@ -26,8 +26,6 @@ SILENT_AFTER_S = 3.5
 FIND_TIMEOUT_S = 5.0
 ORDER_TIMEOUT_S = 15.0  # LCM's self-test on the deputy's side may take 10 s
 REPEAT_S = 0.3
-STATE_NAMES = {getattr(procman_process_t, name): name.lower().replace("_", " ")
-               for name in ("WAITING", "STARTING", "READY", "FINISHED", "BACKING_OFF", "STOPPING", "STOPPED", "ENDED", "FAILED")}
 
 
 @dataclass

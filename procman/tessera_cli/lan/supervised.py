@@ -27,6 +27,8 @@ STABLE_AFTER_S = 10.0
 MAX_DEATHS_IN_A_ROW = 6
 # Of its output, what is kept to be quoted as its last words.
 MAX_LINE = 500
+STATE_NAMES = {getattr(states, name): name.lower().replace("_", " ")
+               for name in ("WAITING", "STARTING", "READY", "FINISHED", "BACKING_OFF", "STOPPING", "STOPPED", "ENDED", "FAILED")}
 UP = (states.STARTING, states.READY, states.FINISHED)
 READY = (states.READY, states.FINISHED)
 

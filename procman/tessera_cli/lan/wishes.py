@@ -4,9 +4,10 @@ import hashlib
 from dataclasses import fields
 
 from tessera_cli.errors import UserError
+from tessera_cli.lan.attributes import MAX_INSTANCES, NAME, OPTIONS, RunOptions
 from tessera_cli.lan.child import Launch
 from tessera_cli.lan.command_list import LocalCommand
-from tessera_cli.lan.process_list import MAX_INSTANCES, NAME, OPTIONS, Process, RunOptions
+from tessera_cli.lan.process_list import Process
 from tessera_cli.types import procman_wish_t
 
 
