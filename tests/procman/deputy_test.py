@@ -3,11 +3,13 @@
 import os
 import random
 import signal
+import socket
+import subprocess
 
 import lcm
 from nacl.signing import SigningKey
 
-from deputies import make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+from deputies import environment, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 from orders_test import KEY, bad_order
 from tessera_cli.lan.keys import KeyRing, to_text
 from tessera_cli.lan.orders import Gate, sign
@@ -147,6 +149,42 @@ def test_without_a_deputy_commands_say_so(make_node):
     for command in ("down", "status"):
         finished = node.command(command)
         assert finished.returncode == 1 and "no deputy answers" in finished.stderr
+
+
+def test_what_runs_needs_no_sheriff_and_another_one_finds_it(make_node):
+    node = make_node(COMMANDS).start()
+    (node.folder / "list.pmd").write_text(listed("sleeper") + 'script "s" { start cmd "sleeper"; wait ms 100000; }')
+    script = subprocess.Popen(node.line("up", node.folder / "list.pmd", "--script", "s"), env=environment(), stdin=subprocess.DEVNULL)
+    wait_for(node.marked, "its process")
+    pids = node.marked()
+    script.kill()
+    script.wait()
+    assert node.up(listed("sleeper")).returncode == 0
+    assert node.marked() == pids == [node.processes()["sleeper"]["pid"]]
+
+
+def test_watch_prints_lines_without_a_terminal(make_node):
+    node = make_node(COMMANDS).start()
+    assert node.up(listed("sleeper")).returncode == 0
+    watch = subprocess.Popen(node.line("watch"), env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+    try:
+        assert watch.stdout.readline() == "no pose yet\n"
+        assert watch.stdout.readline().startswith("node1 (")
+        assert watch.stdout.readline().split()[:2] == ["sleeper", "ready"]
+        watch.terminate()
+        assert watch.wait(30) == 0
+    finally:
+        watch.kill()
+
+
+def test_a_busy_port_is_told(make_node):
+    node = make_node(COMMANDS)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("", node.port + 3))
+        for command in ("deputy", "status"):
+            finished = node.command(command)
+            assert finished.returncode == 1 and f"{node.port + 3}" in finished.stderr and "hold its port" in finished.stderr
+            assert "Traceback" not in finished.stderr
 
 
 def test_who_is_not_trusted_is_not_obeyed_and_told_why(make_node, monkeypatch, tmp_path):

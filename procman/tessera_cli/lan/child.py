@@ -50,6 +50,7 @@ class Child:
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=lambda: _prepare(parent, launch.options))
         os.set_blocking(self._popen.stdout.fileno(), False)
         self.pid = self._popen.pid
+        self.may_say_more = True  # until it and all its descendants have closed their output
 
     def fileno(self) -> int:
         return self._popen.stdout.fileno()
@@ -57,9 +58,11 @@ class Child:
     def read(self) -> bytes:
         """What it wrote since; empty if nothing."""
         try:
-            return os.read(self.fileno(), READ_BYTES)
+            data = os.read(self.fileno(), READ_BYTES)
         except BlockingIOError:
             return b""
+        self.may_say_more = bool(data)
+        return data
 
     def poll(self) -> int | None:
         """Exit status, negative: by that signal; None while it runs."""

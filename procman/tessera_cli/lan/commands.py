@@ -12,7 +12,7 @@ from tessera_cli.lan.process_list import ProcessList, read_process_list
 from tessera_cli.lan.procman_bus import ttl_of
 from tessera_cli.lan.script import ScriptRunner
 from tessera_cli.lan.sheriff import TURN_S, Sheriff
-from tessera_cli.lan.supervised import STATE_NAMES
+from tessera_cli.lan.supervised import READY, STATE_NAMES
 from tessera_cli.types import procman_order_t, procman_output_t, procman_process_t
 
 # A message that fits one packet of a LAN: the loss of a fragment would lose it whole.
@@ -106,7 +106,8 @@ def print_status(sheriff: Sheriff) -> None:
               f"{heard.status.num_obeyed} orders obeyed, {refused} refused")
         for process in heard.status.processes:
             figures = f"{process.cpu_percent:5.0f} % {process.rss_mb:6.0f} MB  pid {process.pid}" if process.pid else ""
-            print(f"  {process.name:20s} {STATE_NAMES.get(process.state, '?'):12s} {process.num_starts:3d} starts {figures}  {process.reason}".rstrip())
+            state = STATE_NAMES.get(process.state, "?")
+            print(f"  {process.name:20s} {state:12s} {process.num_starts:3d} starts {figures}  {process.reason}".rstrip())
 
 
 def restart(arguments: Namespace) -> int:
@@ -115,10 +116,12 @@ def restart(arguments: Namespace) -> int:
     order = procman_order_t()
     order.action, order.process = procman_order_t.RESTART, arguments.name
     deputy = sheriff.deputy_of(arguments.name)
-    starts = sheriff.processes()[arguments.name][1].num_starts
+    process = sheriff.processes()[arguments.name][1]
+    starts = process.num_starts
     sheriff.send(deputy, order)
     until = time.monotonic() + arguments.timeout
-    while (process := sheriff.processes()[arguments.name][1]).num_starts == starts or process.state not in (procman_process_t.READY, procman_process_t.FINISHED):
+    while process.num_starts == starts or process.state not in READY:
+        process = sheriff.processes().get(arguments.name, (deputy, process))[1]
         if time.monotonic() > until or process.state == procman_process_t.FAILED:
             raise RunFailed(f"{arguments.name} on {deputy} is {STATE_NAMES.get(process.state, '?')}: {process.reason or 'no reason given'}.")
         sheriff.listen(TURN_S)

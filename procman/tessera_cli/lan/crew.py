@@ -34,8 +34,9 @@ class Crew:
         return list(self._members.values())
 
     @property
-    def children(self) -> list[Child]:
-        return [member.child for member in self._members.values() if member.child]
+    def talkers(self) -> list[Child]:
+        """Whose output is worth waiting for."""
+        return [member.child for member in self._members.values() if member.child and member.child.may_say_more]
 
     @property
     def is_idle(self) -> bool:
@@ -59,7 +60,8 @@ class Crew:
 
     def want(self, launches: dict[str, Launch], session: str) -> None:
         """Exactly these; the others are ended. Those that ended before are forgotten."""
-        self._members = {name: member for name, member in self._members.items() if name in launches or not member.is_idle}
+        for name in [name for name, member in self._members.items() if member.is_idle and name not in launches]:
+            self._members.pop(name).log.close()
         for name in [name for name in launches if name not in self._members]:
             log = RotatingLog(self._folder.log_path(name))
             self._members[name] = Supervised(name, self._folder.mark(name), log, self._on_output)
@@ -96,7 +98,7 @@ class Crew:
             member.step(now, self._is_not_ready, member.name in needed)
 
     def _measure(self, now: float) -> None:
-        usages = self._trees.snapshot([child.pid for child in self.children], now)
+        usages = self._trees.snapshot([member.child.pid for member in self._members.values() if member.child], now)
         for member in self._members.values():
             if member.child and member.child.pid in usages:
                 member.usage = usages[member.child.pid]

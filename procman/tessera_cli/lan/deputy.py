@@ -70,13 +70,14 @@ class Deputy:
         self._bus.subscribe(ORDER, None, self._on_order)
         if not kill_marked(f"{self._folder.path}/"):
             raise RunFailed("processes of an earlier deputy of this folder can't be ended.")
-        guard = subprocess.Popen([sys.executable, "-m", "tessera_cli.lan.guard", str(self._folder.path)], stdin=subprocess.PIPE,
-                                 start_new_session=True, env={**os.environ, "PYTHONPATH": str(ROOT / "procman")})
+        guard = self._start_guard()
         self._say(f"deputy {self._id} on {self._bus.url}; logs in {self._folder.path / 'logs'}")
         if self._resumes:
             self._resume()
         while not interrupt.requested:
             self._turn()
+            if guard.poll() is not None:
+                guard = self._start_guard()
         self._say("ending all processes")
         self._crew.want({}, "")
         while not self._crew.is_idle:
@@ -84,6 +85,10 @@ class Deputy:
         self._publish_status()
         guard.stdin.close()
         return guard.wait()
+
+    def _start_guard(self) -> subprocess.Popen:
+        return subprocess.Popen([sys.executable, "-m", "tessera_cli.lan.guard", str(self._folder.path)], stdin=subprocess.PIPE,
+                                start_new_session=True, env={**os.environ, "PYTHONPATH": str(ROOT / "procman")})
 
     def _say(self, sentence: str) -> None:
         print(f"tessera: {sentence}", flush=True)
@@ -107,7 +112,7 @@ class Deputy:
 
     def _turn(self) -> None:
         buses = [bus for bus in (self._bus, self._stages) if bus]
-        self._wait(TURN_S, buses + self._crew.children)
+        self._wait(TURN_S, buses + self._crew.talkers)
         for bus in buses:
             bus.handle_waiting()
         now = time.monotonic()

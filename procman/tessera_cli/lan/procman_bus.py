@@ -51,10 +51,11 @@ class Bus:
                 return
             handler(message)
 
-        try:
-            self._lcm.subscribe(channel, on_message).set_queue_capacity(QUEUE_CAPACITY)
-        except RuntimeError as error:
-            raise RunFailed(_explain(self.url, error)) from error
+        # None: the port is taken by a program that shares it with nobody, or LCM's self-test heard nothing.
+        subscription = self._lcm.subscribe(channel, on_message)
+        if subscription is None:
+            raise RunFailed(_explain(self.url, "nothing can be received"))
+        subscription.set_queue_capacity(QUEUE_CAPACITY)
 
     def fileno(self) -> int:
         return self._lcm.fileno()
@@ -80,6 +81,6 @@ class Bus:
             pass
 
 
-def _explain(url: str, error: Exception) -> str:
-    return (f"the bus {url} can't be opened ({error}): is multicast possible on this machine? Try: sudo ip link set lo multicast on; "
-            "sudo ip route add 224.0.0.0/4 dev lo (with --lan: dev the network's device)")
+def _explain(url: str, why: object) -> str:
+    return (f"the bus {url} can't be opened ({why}). Does another program hold its port (ss -ulpn shows which; --port N takes others)? "
+            "Is multicast possible? Try: sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo (with --lan: dev the network's device)")

@@ -25,6 +25,8 @@ MEET_S = 1.3
 SILENT_AFTER_S = 3.5
 FIND_TIMEOUT_S = 5.0
 ORDER_TIMEOUT_S = 15.0  # LCM's self-test on the deputy's side may take 10 s
+# A deputy that meanwhile counts orders of strangers, and obeys none, counts ours.
+DISTRUST_TIMEOUT_S = 3.0
 REPEAT_S = 0.3
 
 
@@ -36,6 +38,10 @@ class Heard:
     @property
     def is_silent(self) -> bool:
         return time.monotonic() - self.at > SILENT_AFTER_S
+
+
+def _num_distrusted(status: procman_status_t) -> int:
+    return sum(number for kind, number in zip(status.kinds, status.num_refused) if kind == "unknown key")
 
 
 class Sheriff:
@@ -88,9 +94,11 @@ class Sheriff:
     def send(self, deputy: str, order: procman_order_t) -> str:
         """Repeats it until the deputy has obeyed or refused it. Returns its id."""
         order.header, order.deputy, order.order = self._bus.header(ORDER), deputy, draw_order_id()
-        until, repeat_at = time.monotonic() + ORDER_TIMEOUT_S, 0.0
+        began, repeat_at = time.monotonic(), 0.0
+        distrusted = _num_distrusted(self.deputies[deputy].status)
         while (status := self.deputies[deputy].status).last_order != order.order:
-            if time.monotonic() > until:
+            waited_s = time.monotonic() - began
+            if waited_s > ORDER_TIMEOUT_S or (waited_s > DISTRUST_TIMEOUT_S and _num_distrusted(status) > distrusted):
                 raise RunFailed(self._explain_silence(deputy, status))
             if time.monotonic() >= repeat_at:
                 # Another sheriff may have taken the number meanwhile, and the deputy may have been started anew.
