@@ -58,6 +58,16 @@ def test_what_was_killed_is_started_again_and_restart_does_so_on_purpose(make_no
     assert node.command("restart", "nobody").returncode == 2
 
 
+def test_a_process_has_its_nice_value_cpus_folder_and_environment(make_node, tmp_path):
+    node = make_node(f'cmd "placed" {{ exec = "sh -c \'echo $COLOUR $PWD; exec sleep 1000\'"; folder = "{tmp_path}"; environment = "COLOUR=blue"; }}').start()
+    cpu = min(os.sched_getaffinity(0))
+    assert node.up(listed("placed", more=f'nice = 7; cpus = "{cpu}";')).returncode == 0
+    pid = node.processes()["placed"]["pid"]
+    assert os.getpriority(os.PRIO_PROCESS, pid) == os.getpriority(os.PRIO_PROCESS, 0) + 7
+    assert os.sched_getaffinity(pid) == {cpu}
+    wait_for(lambda: node.command("log", "placed").stdout == f"blue {tmp_path}\n", "its words")
+
+
 def test_a_whole_tree_ends_in_time_though_it_ignores_the_signal_and_made_sessions(make_node):
     node = make_node(COMMANDS).start()
     assert node.up(listed("family", more="stop_time_allowed = 0.5;")).returncode == 0

@@ -131,6 +131,8 @@ class Deputy:
 
     def _on_deputy(self, status: procman_status_t) -> None:
         if status.deputy == self._id and status.nonce != self.gate.nonce:
+            if not self._twin:
+                self._say(f"another deputy with the id {self._id} speaks, on {status.host}")
             self._twin = status.host
         elif status.run == self._run:
             self._crew.hear_of_others(status, time.monotonic())
