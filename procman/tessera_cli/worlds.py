@@ -16,14 +16,14 @@ RECORDED = ROOT.parent / "shared" / "data"
 REAL = ("kitti:{}/kitti/sequences/03", "kitti:{}/torcs/g-track-3")
 MADE = ("sim:street", "sim:street,seed=7", "sim:street-short")
 NUM_FRAMES = 801
-HEADINGS = {"corners_per_image": "corners an image", "matches_per_frame": "matches a frame", "observations_per_landmark": "track length (keyframes)",
+HEADINGS = {"corners_per_image": "keypoints sent an image", "matches_per_frame": "matches a frame", "observations_per_landmark": "track length (keyframes)",
             "drift_percent": "drift (% of the way)", "length_m": "way (m)", "frames": "frames", "lost": "lost"}
 
 
 @dataclass(frozen=True)
 class Row:
     source: str
-    corners_per_image: float  # before the selection of 2000
+    corners_per_image: float  # keypoints that extraction sends; 2000 where there are enough corners
     matches_per_frame: float  # with landmarks, inliers
     observations_per_landmark: float
     drift_percent: float  # RMS error after Sim(3) alignment, without loop closing
