@@ -234,6 +234,12 @@ const std::vector<Observation>& Map::ObservationsOf(LandmarkId id) const {
   return observations == nullptr ? kNone : *observations;
 }
 
+bool Map::IsSeenBy(LandmarkId landmark, KeyframeId keyframe) const {
+  const std::vector<Observation>& observations = ObservationsOf(landmark);
+  return std::any_of(observations.begin(), observations.end(),
+                     [&](const Observation& observation) { return observation.keyframe == keyframe; });
+}
+
 std::vector<KeyframeId> Map::Covisible(KeyframeId id, int max_num, int min_shared) const {
   std::vector<std::pair<int32_t, KeyframeId>> ranked;
   if (const Keyframe* keyframe = keyframes_.Find(id); keyframe != nullptr) {

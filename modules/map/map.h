@@ -123,6 +123,7 @@ class Map {
   const Landmark* FindLandmark(LandmarkId id) const { return landmarks_.Find(id); }
   // Sorted by keyframe; empty if there is no such landmark.
   const std::vector<Observation>& ObservationsOf(LandmarkId id) const;
+  bool IsSeenBy(LandmarkId landmark, KeyframeId keyframe) const;
   const IdMap<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   const IdMap<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
   // In the order in which they were closed. Their keyframes stay in the map.

@@ -82,10 +82,7 @@ void MapEditor::MergeLandmarks(LandmarkId removed, LandmarkId kept) {
   const std::vector<Observation> observations = map_.ObservationsOf(removed);
   RemoveLandmark(removed);
   for (const Observation& observation : observations) {
-    const auto& kept_observations = map_.ObservationsOf(kept);
-    const bool sees_kept = std::any_of(kept_observations.begin(), kept_observations.end(),
-                                       [&](const Observation& other) { return other.keyframe == observation.keyframe; });
-    if (!sees_kept) {
+    if (!map_.IsSeenBy(kept, observation.keyframe)) {
       AddObservation(kept, observation);
     }
   }

@@ -10,6 +10,26 @@ KeyframeId RootOf(const Map& map, KeyframeId id) {
   }
 }
 
+// A tree may be as deep as the map is long, so what was found on one way to the root is not looked for on the next.
+std::vector<KeyframeId> PartOf(const Map& map, KeyframeId id) {
+  enum class Membership : char { kUnknown, kInside, kOutside };
+  std::vector<Membership> membership(static_cast<size_t>(map.keyframes().end_id()), Membership::kUnknown);
+  const auto of = [&](KeyframeId keyframe) -> Membership& { return membership[static_cast<size_t>(keyframe.value)]; };
+  of(RootOf(map, id)) = Membership::kInside;
+  std::vector<KeyframeId> part, way;
+  map.keyframes().ForEach([&](KeyframeId keyframe, const Keyframe&) {
+    way.clear();
+    KeyframeId ancestor = keyframe;
+    for (; ancestor.valid() && of(ancestor) == Membership::kUnknown; ancestor = map.FindKeyframe(ancestor)->parent) {
+      way.push_back(ancestor);
+    }
+    const Membership found = ancestor.valid() ? of(ancestor) : Membership::kOutside;
+    for (const KeyframeId member : way) of(member) = found;
+    if (found == Membership::kInside) part.push_back(keyframe);
+  });
+  return part;
+}
+
 void HangBelow(KeyframeId id, KeyframeId parent, MapEditor& editor) {
   while (id.valid()) {
     const KeyframeId old_parent = editor.map().FindKeyframe(id)->parent;

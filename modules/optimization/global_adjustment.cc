@@ -1,5 +1,6 @@
 #include "optimization/global_adjustment.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "map/spanning_tree.h"
@@ -8,14 +9,15 @@
 namespace tessera {
 namespace {
 
-LocalWindow WholePart(const Map& map, KeyframeId root) {
+LocalWindow WholePart(const Map& map, KeyframeId member) {
   LocalWindow window;
-  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
-    if (RootOf(map, id) == root) window.inner.push_back(id);
-  });
+  window.inner = PartOf(map, member);
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
     const std::vector<Observation>& observations = map.ObservationsOf(id);
-    if (observations.size() >= 2 && RootOf(map, observations.front().keyframe) == root) window.landmarks.push_back(id);
+    if (observations.size() < 2) return;
+    const bool is_inside =
+        std::binary_search(window.inner.begin(), window.inner.end(), observations.front().keyframe);
+    if (is_inside) window.landmarks.push_back(id);
   });
   return window;
 }
@@ -27,7 +29,7 @@ GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOp
   GlobalAdjustment adjustment;
   adjustment.answers = asked;
   adjustment.delta = map.next_delta() - 1;
-  const LocalWindow part = WholePart(map, RootOf(map, asked));
+  const LocalWindow part = WholePart(map, asked);
   if (part.inner.size() < 2 || part.landmarks.empty()) return adjustment;
   const BundleProblem problem = BuildLocalProblem(map, part, {});
   const std::optional<BundleResult> result = AdjustBundle(problem, options);

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "geometry/absolute_pose.h"
+#include "map/neighbourhood.h"
+#include "tracking/frame_pose.h"
 
 namespace tessera {
 namespace {
@@ -154,7 +156,7 @@ bool MapTracker::Place(TrackedFrame& frame) const {
   const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalise(frame);
   if (!is_near) return false;
   MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
-  return OptimizeFrame(frame) >= (lost_since_us_ ? options_.min_relocalised_inliers : options_.min_inliers);
+  return OptimizeFrame(options_.pose, frame) >= (lost_since_us_ ? options_.min_relocalised_inliers : options_.min_inliers);
 }
 
 bool MapTracker::FollowLast(TrackedFrame& frame) const {
@@ -164,7 +166,7 @@ bool MapTracker::FollowLast(TrackedFrame& frame) const {
   for (const double widening : {1.0, 2.0, 4.0}) {
     frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
     const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
-    if (num >= options_.min_last_matches && OptimizeFrame(frame) >= options_.min_last_matches / 2) return true;
+    if (num >= options_.min_last_matches && OptimizeFrame(options_.pose, frame) >= options_.min_last_matches / 2) return true;
   }
   return false;
 }
@@ -186,7 +188,7 @@ bool MapTracker::Relocalise(TrackedFrame& frame) const {
   const auto pose = EstimateAbsolutePose(frame.view->calibration(), pairs, seed, {});
   if (!pose) return false;
   frame.world_from_camera = pose->camera_from_world.Inverse();
-  return OptimizeFrame(frame) >= options_.min_last_matches / 2;
+  return OptimizeFrame(options_.pose, frame) >= options_.min_last_matches / 2;
 }
 
 // The frame that asked, this one or one before, becomes the last that was tracked. False if the answer does not hold in
@@ -203,35 +205,15 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
       frame.points[Index(seen.keypoint)] = {{seen.landmark, {}, -1}, *landmark};
     }
   }
-  if (OptimizeFrame(frame) < options_.min_relocalised_inliers / 2) return false;
+  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalised_inliers / 2) return false;
   MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
-  if (OptimizeFrame(frame) < options_.min_relocalised_inliers) return false;
+  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalised_inliers) return false;
   reference_ = answer.reference;
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
   current_from_last_.reset();
   last_.emplace(Last{std::move(frame), reference_from_camera});
   return true;
-}
-
-// Refines the pose on the points seen, and forgets those that disagree. Returns how many are left.
-int MapTracker::OptimizeFrame(TrackedFrame& frame) const {
-  std::vector<PoseObservation> observations;
-  std::vector<size_t> keypoints;
-  for (int i = 0; i < frame.view->size(); ++i) {
-    const SeenPoint& point = frame.points[Index(i)];
-    if (!point.valid()) continue;
-    observations.push_back({point.landmark.position_in_world, Eigen::Matrix3d::Zero(), frame.view->observation(i)});
-    keypoints.push_back(Index(i));
-  }
-  const PoseOptimizationResult result =
-      OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
-                   frame.world_from_camera.Inverse(), options_.pose);
-  frame.world_from_camera = result.camera_from_world.Inverse();
-  for (size_t k = 0; k < keypoints.size(); ++k) {
-    if (!result.is_inlier[k]) frame.points[keypoints[k]] = {};
-  }
-  return result.num_inliers;
 }
 
 // The keyframes that share most points with the frame, and then their neighbours, as long as there is room.
@@ -264,16 +246,8 @@ PlacedPoints MapTracker::LocalPoints(const TrackedFrame& frame) const {
     if (point.valid()) seen.push_back(point.id);
   }
   std::sort(seen.begin(), seen.end());
-  std::vector<LandmarkId> known;
-  for (const KeyframeId id : LocalKeyframes(frame)) {
-    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-      if (landmark.valid()) known.push_back(landmark);
-    }
-  }
-  std::sort(known.begin(), known.end());
-  known.erase(std::unique(known.begin(), known.end()), known.end());
   PlacedPoints points;
-  for (const LandmarkId id : known) {
+  for (const LandmarkId id : LandmarksSeenBy(map, LocalKeyframes(frame))) {
     const PointId point{id, {}, -1};
     if (!std::binary_search(seen.begin(), seen.end(), point)) points.emplace_back(point, *map.FindLandmark(id));
   }

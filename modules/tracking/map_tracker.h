@@ -84,7 +84,6 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool FollowLast(TrackedFrame& frame) const;
   bool Relocalise(TrackedFrame& frame) const;
-  int OptimizeFrame(TrackedFrame& frame) const;
   std::vector<KeyframeId> LocalKeyframes(const TrackedFrame& frame) const;
   PlacedPoints LocalPoints(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame);

@@ -180,7 +180,7 @@ TEST(MapBending, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
   SyntheticWorld world(SensorType::kStereo, 0.2);
   PlantedMap planted(world);
   for (int64_t k = 0; k < 4; ++k) planted.Add(k, {k - 1});
-  const AdjustmentBase base = TakeBase(planted.map(), {3});
+  const AdjustmentBase base = TakeBase(planted.map());
   const auto shift = [](int64_t k) { return Rigid3{ExpSO3({0.0, 0.01 * static_cast<double>(k), 0.0}), {0.0, 0.1, 0.0}}; };
   GlobalAdjustment adjustment;
   adjustment.answers = {3};
@@ -242,7 +242,7 @@ TEST(GlobalAdjustment, BringsABentMapNearerToTheTruth) {
     const GlobalAdjustment adjustment = AdjustGlobally(map, {12}, GlobalBundleOptions());
     ASSERT_TRUE(adjustment.is_usable);
     EXPECT_EQ(adjustment.answers, KeyframeId{12});
-    EditBoth(map, [&](MapEditor& editor) { ApplyAdjustment(adjustment, TakeBase(map, {12}), editor); });
+    EditBoth(map, [&](MapEditor& editor) { ApplyAdjustment(adjustment, TakeBase(map), editor); });
     // Mono: the root stays, and so does the length of the second keyframe's way, so the scale is known to a few percent.
     const double share = sensor == SensorType::kStereo ? 0.1 : 0.3;
     EXPECT_LT(planted.WorstKeyframe(map), share * before) << ToString(sensor);

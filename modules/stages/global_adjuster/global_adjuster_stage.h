@@ -3,9 +3,9 @@
 
 #include <optional>
 
+#include "geometry/camera_frame.h"
 #include "map/loop_types.h"
 #include "optimization/bundle_adjustment.h"
-#include "geometry/camera_frame.h"
 #include "transport/map_subscription.h"
 #include "transport/stage.h"
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <optional>
 
+#include "geometry/camera_frame.h"
 #include "map/loop_types.h"
 #include "stages/loop_closer/loop_closer.h"
-#include "geometry/camera_frame.h"
 #include "transport/map_subscription.h"
 #include "transport/stage.h"
 

@@ -36,13 +36,12 @@ std::set<std::pair<KeyframeId, KeyframeId>> EssentialPairs(const Map& map, const
 std::vector<LoopResult::Correction> JoinParts(const Map& map, KeyframeId current, const VerifiedPlace& place) {
   const Sim3 matched_world_from_current_world =
       Place(map, place.matched) * place.matched_from_current * Place(map, current).Inverse();
-  const KeyframeId current_root = RootOf(map, current), matched_root = RootOf(map, place.matched);
-  const bool moves_current = current_root > matched_root;
+  const bool moves_current = RootOf(map, current) > RootOf(map, place.matched);
   const Sim3 new_from_old = moves_current ? matched_world_from_current_world : matched_world_from_current_world.Inverse();
   std::vector<LoopResult::Correction> corrections;
-  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
-    if (RootOf(map, id) == (moves_current ? current_root : matched_root)) corrections.push_back({id, new_from_old});
-  });
+  for (const KeyframeId id : PartOf(map, moves_current ? current : place.matched)) {
+    corrections.push_back({id, new_from_old});
+  }
   return corrections;
 }
 
@@ -59,11 +58,10 @@ PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const V
   problem.has_scale = map.FindKeyframe(current)->features->calibration.sensor == SensorType::kMono;
   const KeyframeId root = RootOf(map, current);
   std::map<KeyframeId, int> node_of;
-  map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-    if (RootOf(map, id) != root) return;
+  for (const KeyframeId id : PartOf(map, current)) {
     node_of[id] = static_cast<int>(problem.nodes.size());
-    problem.nodes.push_back({id, Sim3::From(keyframe.world_from_camera), id == root});
-  });
+    problem.nodes.push_back({id, Place(map, id), id == root});
+  }
   for (const auto& [older, newer] : EssentialPairs(map, node_of, options.min_shared_landmarks)) {
     problem.edges.push_back({node_of[newer], node_of[older], Place(map, older).Inverse() * Place(map, newer), 1.0,
                              MedianDepth(map, *map.FindKeyframe(newer))});

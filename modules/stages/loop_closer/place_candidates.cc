@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "map/neighbourhood.h"
+
 namespace tessera {
 namespace {
 
@@ -24,7 +26,7 @@ std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::P
   for (const PlaceDatabase::Place& place : found) {
     Group group{0.0, place.id};
     double best_score = place.score;
-    for (const KeyframeId id : PlaceAround(map, place.id, options.num_neighbours)) {
+    for (const KeyframeId id : KeyframesAround(map, place.id, options.num_neighbours)) {
       const auto member = score_of.find(id);
       if (member == score_of.end()) continue;
       group.score += member->second;
@@ -99,12 +101,6 @@ std::string CandidateOptions::Check() const {
   return "";
 }
 
-std::vector<KeyframeId> PlaceAround(const Map& map, KeyframeId id, int num_neighbours) {
-  std::vector<KeyframeId> place = map.Covisible(id, num_neighbours);
-  place.insert(place.begin(), id);
-  return place;
-}
-
 Candidates FindLoopCandidates(const Map& map, const PlaceDatabase& places, KeyframeId id,
                               const CandidateOptions& options) {
   Candidates candidates;
@@ -117,12 +113,12 @@ Candidates FindLoopCandidates(const Map& map, const PlaceDatabase& places, Keyfr
   for (const KeyframeId witness : witnesses) {
     std::set<KeyframeId>& seen = seen_by.emplace_back();
     for (const Group& group : FindGroups(map, places, witness, options)) {
-      const std::vector<KeyframeId> place = PlaceAround(map, group.best, options.num_neighbours);
+      const std::vector<KeyframeId> place = KeyframesAround(map, group.best, options.num_neighbours);
       seen.insert(place.begin(), place.end());
     }
   }
   for (const Group& group : groups) {
-    const std::vector<KeyframeId> place = PlaceAround(map, group.best, options.num_neighbours);
+    const std::vector<KeyframeId> place = KeyframesAround(map, group.best, options.num_neighbours);
     const bool is_confirmed = std::all_of(seen_by.begin(), seen_by.end(), [&](const std::set<KeyframeId>& seen) {
       return std::any_of(place.begin(), place.end(), [&](KeyframeId member) { return seen.contains(member); });
     });

@@ -36,7 +36,4 @@ Candidates FindLoopCandidates(const Map& map, const PlaceDatabase& places, Keyfr
 std::vector<KeyframeId> FindPlaces(const Map& map, const PlaceDatabase& places, const BagOfWords& bag,
                                    const CandidateOptions& options);
 
-// The keyframe and its best neighbours.
-std::vector<KeyframeId> PlaceAround(const Map& map, KeyframeId id, int num_neighbours);
-
 }  // namespace tessera

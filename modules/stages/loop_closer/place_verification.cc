@@ -2,34 +2,29 @@
 
 #include <map>
 #include <memory>
-#include <set>
 
-#include "stages/loop_closer/place_candidates.h"
+#include "map/neighbourhood.h"
+#include "tracking/frame_pose.h"
 
 namespace tessera {
 namespace {
 
 size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
 
-// A landmark of the current keyframe and one of the matched, taken for the same point.
-struct LandmarkPair {
-  int32_t matched_keypoint = -1;
-  int32_t current_keypoint = -1;
-};
-
-PointPair MakePair(const Map& map, const Keyframe& matched, const Keyframe& current, const LandmarkPair& pair) {
+// A keypoint of the matched keyframe (first) and one of the current (second), whose landmarks are taken for one point.
+PointPair MakePair(const Map& map, const Keyframe& matched, const Keyframe& current, const KeypointPair& pair) {
   const auto seen = [&](const Keyframe& keyframe, int32_t keypoint, Eigen::Vector3d* point, PixelObservation* pixel) {
     const Landmark& landmark = *map.FindLandmark(keyframe.landmarks[Index(keypoint)]);
     *point = keyframe.world_from_camera.Inverse() * landmark.position_in_world;
     *pixel = SeenAt(*keyframe.features, keypoint);
   };
   PointPair points;
-  seen(matched, pair.matched_keypoint, &points.point_in_first, &points.seen_first);
-  seen(current, pair.current_keypoint, &points.point_in_second, &points.seen_second);
+  seen(matched, pair.first, &points.point_in_first, &points.seen_first);
+  seen(current, pair.second, &points.point_in_second, &points.seen_second);
   return points;
 }
 
-std::vector<LandmarkPair> MatchLandmarks(const PlaceDatabase& places, KeyframeId matched_id, const Keyframe& matched,
+std::vector<KeypointPair> MatchLandmarks(const PlaceDatabase& places, KeyframeId matched_id, const Keyframe& matched,
                                          KeyframeId current_id, const Keyframe& current,
                                          const BagMatchingOptions& options) {
   const BagOfWords* matched_bag = places.Find(matched_id);
@@ -38,12 +33,8 @@ std::vector<LandmarkPair> MatchLandmarks(const PlaceDatabase& places, KeyframeId
   const auto sees = [](const Keyframe& keyframe) {
     return [&keyframe](int32_t keypoint) { return keyframe.landmarks[Index(keypoint)].valid(); };
   };
-  std::vector<LandmarkPair> pairs;
-  for (const KeypointPair& pair : MatchByBags(*matched.features, *matched_bag, sees(matched), *current.features,
-                                              *current_bag, sees(current), options)) {
-    pairs.push_back({pair.first, pair.second});
-  }
-  return pairs;
+  return MatchByBags(*matched.features, *matched_bag, sees(matched), *current.features, *current_bag, sees(current),
+                     options);
 }
 
 // What the current keyframe sees of the place and knows under another name, as far as the matched keyframe sees it too.
@@ -81,15 +72,11 @@ std::string VerificationOptions::Check() const {
   return "";
 }
 
-PlacedPoints LandmarksAround(const Map& map, KeyframeId id, int num_neighbours) {
-  std::set<LandmarkId> landmarks;
-  for (const KeyframeId member : PlaceAround(map, id, num_neighbours)) {
-    for (const LandmarkId landmark : map.FindKeyframe(member)->landmarks) {
-      if (landmark.valid()) landmarks.insert(landmark);
-    }
-  }
+PlacedPoints LandmarksAround(const Map& map, KeyframeId center, int num_neighbours) {
   PlacedPoints points;
-  for (const LandmarkId landmark : landmarks) points.emplace_back(PointId{landmark, {}, -1}, *map.FindLandmark(landmark));
+  for (const LandmarkId id : LandmarksSeenBy(map, KeyframesAround(map, center, num_neighbours))) {
+    points.emplace_back(PointId{id, {}, -1}, *map.FindLandmark(id));
+  }
   return points;
 }
 
@@ -97,21 +84,7 @@ int PlaceAmong(const PlacedPoints& points, const MatchOptions& matching, const P
                TrackedFrame& frame) {
   frame.points.assign(frame.points.size(), {});
   MatchLocal(points, matching.local_radius_px, matching, frame);
-  std::vector<PoseObservation> observations;
-  std::vector<size_t> keypoints;
-  for (size_t i = 0; i < frame.points.size(); ++i) {
-    if (!frame.points[i].valid()) continue;
-    observations.push_back({.point_in_world = frame.points[i].landmark.position_in_world,
-                            .seen = frame.view->observation(static_cast<int>(i))});
-    keypoints.push_back(i);
-  }
-  const PoseOptimizationResult result = OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
-                                                     frame.world_from_camera.Inverse(), pose);
-  frame.world_from_camera = result.camera_from_world.Inverse();
-  for (size_t k = 0; k < keypoints.size(); ++k) {
-    if (!result.is_inlier[k]) frame.points[keypoints[k]] = {};
-  }
-  return result.num_inliers;
+  return OptimizeFrame(pose, frame);
 }
 
 std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& places, KeyframeId current_id,
@@ -121,13 +94,13 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
   const Keyframe& matched = *map.FindKeyframe(candidate);
   const CameraCalibration& camera = current.features->calibration;
   const SimilarityOptions similarity = SimilarityFor(camera, options.similarity);
-  const std::vector<LandmarkPair> matches =
+  const std::vector<KeypointPair> matches =
       MatchLandmarks(places, candidate, matched, current_id, current, options.matching);
   steps->is_matched = static_cast<int>(matches.size()) >= options.min_matches;
   if (!steps->is_matched) return std::nullopt;
 
   std::vector<PointPair> pairs;
-  for (const LandmarkPair& match : matches) pairs.push_back(MakePair(map, matched, current, match));
+  for (const KeypointPair& match : matches) pairs.push_back(MakePair(map, matched, current, match));
   const auto seed = static_cast<uint64_t>(current.features->frame.value);
   const std::optional<SimilarityEstimate> aligned = EstimateSimilarity(camera, pairs, seed, similarity);
   steps->is_aligned = aligned.has_value();

@@ -4,17 +4,12 @@
 #include <set>
 #include <vector>
 
+#include "map/neighbourhood.h"
 #include "tracking/feature_grid.h"
 #include "tracking/landmark_view.h"
 
 namespace tessera {
 namespace {
-
-bool IsSeenBy(const Map& map, LandmarkId landmark, KeyframeId keyframe) {
-  const std::vector<Observation>& observations = map.ObservationsOf(landmark);
-  return std::any_of(observations.begin(), observations.end(),
-                     [&](const Observation& observation) { return observation.keyframe == keyframe; });
-}
 
 // The keyframe's keypoint that shows the landmark best; -1: none does.
 int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const View& view, const Landmark& landmark,
@@ -49,7 +44,7 @@ void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, co
   const View view(keyframe.features->calibration, keyframe.world_from_camera);
   for (const LandmarkId id : landmarks) {
     const Landmark* landmark = map.FindLandmark(id);
-    if (landmark == nullptr || IsSeenBy(map, id, target)) continue;
+    if (landmark == nullptr || map.IsSeenBy(id, target)) continue;
     const int32_t keypoint = BestKeypoint(keyframe, grid, view, *landmark, options);
     if (keypoint < 0) continue;
     const LandmarkId other = keyframe.landmarks[static_cast<size_t>(keypoint)];
@@ -97,13 +92,8 @@ void FuseLandmarks(KeyframeId id, const FusionOptions& options, MapEditor& edito
 
   const std::vector<LandmarkId> own = SeenLandmarks(*map.FindKeyframe(id));
   ProjectLandmarks(targets, own, options, editor);
-  std::set<LandmarkId> theirs;
-  for (const KeyframeId target : targets) {
-    for (const LandmarkId landmark : SeenLandmarks(*map.FindKeyframe(target))) {
-      theirs.insert(landmark);
-    }
-  }
-  ProjectInto(id, {theirs.begin(), theirs.end()}, options, editor);
+  const std::vector<KeyframeId> seers(targets.begin(), targets.end());
+  ProjectInto(id, LandmarksSeenBy(map, seers), options, editor);
 }
 
 }  // namespace tessera

@@ -1,9 +1,9 @@
 #include "stages/mapper/map_bending.h"
 
-#include <algorithm>
 #include <set>
 #include <vector>
 
+#include "map/neighbourhood.h"
 #include "map/spanning_tree.h"
 #include "tracking/map_replica.h"
 
@@ -25,21 +25,6 @@ Corrections Complete(const Map& map, const Corrections& given) {
   return all;
 }
 
-std::set<KeyframeId> KeyframesAround(const Map& map, KeyframeId id, int num_neighbours) {
-  const std::vector<KeyframeId> neighbours = map.Covisible(id, num_neighbours);
-  std::set<KeyframeId> around(neighbours.begin(), neighbours.end());
-  around.insert(id);
-  return around;
-}
-
-std::vector<LandmarkId> LandmarksOf(const Map& map, const std::set<KeyframeId>& keyframes) {
-  std::set<LandmarkId> landmarks;
-  for (const KeyframeId id : keyframes) {
-    for (const LandmarkId landmark : SeenLandmarks(*map.FindKeyframe(id))) landmarks.insert(landmark);
-  }
-  return {landmarks.begin(), landmarks.end()};
-}
-
 // The keyframe sees the landmarks of the older place; what it knew under another name is merged into them.
 void SeeOlderPlace(const LoopResult& loop, MapEditor& editor) {
   const Map& map = editor.map();
@@ -54,10 +39,7 @@ void SeeOlderPlace(const LoopResult& loop, MapEditor& editor) {
       editor.MergeLandmarks(own, seen.landmark);
       continue;
     }
-    const std::vector<Observation>& observations = map.ObservationsOf(seen.landmark);
-    const bool is_seen = std::any_of(observations.begin(), observations.end(),
-                                     [&](const Observation& o) { return o.keyframe == loop.answers; });
-    if (!is_seen) editor.AddObservation(seen.landmark, {loop.answers, seen.keypoint});
+    if (!map.IsSeenBy(seen.landmark, loop.answers)) editor.AddObservation(seen.landmark, {loop.answers, seen.keypoint});
   }
 }
 
@@ -92,17 +74,18 @@ void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEdit
   if (current_root > matched_root) HangBelow(loop.answers, loop.matched, editor);
   if (current_root < matched_root) HangBelow(loop.matched, loop.answers, editor);
 
-  const std::set<KeyframeId> older = KeyframesAround(map, loop.matched, options.num_neighbours);
-  std::set<KeyframeId> newer = KeyframesAround(map, loop.answers, options.num_neighbours);
-  const std::vector<LandmarkId> older_landmarks = LandmarksOf(map, older);
+  const std::vector<KeyframeId> older = KeyframesAround(map, loop.matched, options.num_neighbours);
+  const std::vector<KeyframeId> around_current = KeyframesAround(map, loop.answers, options.num_neighbours);
+  std::set<KeyframeId> newer(around_current.begin(), around_current.end());
+  const std::vector<LandmarkId> older_landmarks = LandmarksSeenBy(map, older);
   SeeOlderPlace(loop, editor);
   for (const KeyframeId id : older) newer.erase(id);
   ProjectLandmarks(newer, older_landmarks, options.search, editor);
   editor.AddClosedLoop({loop.answers, loop.matched, loop.matched_from_current.scale, static_cast<int32_t>(loop.seen.size())});
 }
 
-AdjustmentBase TakeBase(const Map& map, KeyframeId asked) {
-  AdjustmentBase base{asked, {}, {}};
+AdjustmentBase TakeBase(const Map& map) {
+  AdjustmentBase base;
   map.keyframes().ForEach(
       [&](KeyframeId id, const Keyframe& keyframe) { base.world_from_camera.emplace(id, keyframe.world_from_camera); });
   map.landmarks().ForEach(

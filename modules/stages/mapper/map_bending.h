@@ -32,11 +32,10 @@ void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEdit
 
 // The map's poses and positions at the moment when a global adjustment is asked for.
 struct AdjustmentBase {
-  KeyframeId asked;
   std::map<KeyframeId, Rigid3> world_from_camera;
   std::map<LandmarkId, Eigen::Vector3d> positions_in_world;
 };
-AdjustmentBase TakeBase(const Map& map, KeyframeId asked);
+AdjustmentBase TakeBase(const Map& map);
 
 // The map as it is now, with what the adjustment changed against its base:
 //

@@ -19,9 +19,7 @@ bool CanObserve(const Map& map, KeyframeId keyframe, int32_t keypoint, LandmarkI
       seeing->landmarks[static_cast<size_t>(keypoint)].valid()) {
     return false;
   }
-  const std::vector<Observation>& observations = map.ObservationsOf(landmark);
-  return std::none_of(observations.begin(), observations.end(),
-                      [&](const Observation& observation) { return observation.keyframe == keyframe; });
+  return !map.IsSeenBy(landmark, keyframe);
 }
 
 // The spanning tree's parent of a new keyframe: the one that shares most landmarks.
@@ -125,7 +123,7 @@ bool Mapper::Bend(const DueCorrections& due, KeyframeId now, MapEditor& editor) 
 
 bool Mapper::AskForAdjustment(KeyframeId now) {
   if (!wants_adjustment_ || base_) return false;
-  base_ = TakeBase(map_, now);
+  base_ = TakeBase(map_);
   last_asked_ = now;
   wants_adjustment_ = is_base_bent_ = false;
   return true;
