@@ -31,6 +31,8 @@ examples:
 COMMANDS = str(Path(__file__).resolve().parents[1] / "commands.pmd")
 # Of sim:street-short: once around the block and some 40 m of it again.
 DEMO_FRAMES = 593
+# The extractors' own limit (features/feature_types.cc), told before anything starts.
+MAX_FEATURES = 50000
 
 
 class Parser(argparse.ArgumentParser):
@@ -93,7 +95,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--extractors", type=whole_number(1, 256), metavar="P", default=os.cpu_count() or 1,
                         help="extractor processes, default: cores of this machine")
     parser.add_argument("--tiles", type=tiles, metavar="LxC", default="1x1", help="lines x columns that an image is cut into, default 1x1")
-    parser.add_argument("--features", type=whole_number(1, 100000), metavar="N", help="keypoints per image, default 2000")
+    parser.add_argument("--features", type=whole_number(1, MAX_FEATURES), metavar="N", help="keypoints per image, default 2000")
     parser.add_argument("--pace", type=pace, metavar="lockstep|realtime|X",
                         help="default lockstep for files, realtime for cameras; X is a speed factor")
     parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-<source name>")
@@ -193,7 +195,7 @@ def add_vocabulary_command(commands) -> None:
     train.add_argument("--every", type=whole_number(1, 100000), metavar="N", help="one frame in N of a source, default 10")
     train.add_argument("--views", type=whole_number(1, 1000), metavar="N", help="views cut out of each photo, default 4")
     train.add_argument("--camera", metavar="FILE.yaml", help="calibration, where a source brings none")
-    train.add_argument("--features", type=whole_number(1, 100000), metavar="N", help="keypoints per image, default 2000")
+    train.add_argument("--features", type=whole_number(1, MAX_FEATURES), metavar="N", help="keypoints per image, default 2000")
     train.add_argument("--children", type=whole_number(2, 255), metavar="K", help="into which a node is split, default 10")
     train.add_argument("--levels", type=whole_number(1, 10), metavar="L", help="of the tree, default 5: at most K^L words")
     train.add_argument("--seed", type=whole_number(0, 999999999), metavar="N", help="another seed, another vocabulary; default 1")

@@ -15,7 +15,6 @@ Settings Defaults() { return Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/
 TEST(DefaultSettings, OfTheTracker) {
   const Settings settings = Defaults();
   const MapTrackerOptions options;
-  EXPECT_EQ(settings.Get<double>("tracker.sigma_px"), options.sigma_px);
   EXPECT_EQ(settings.Get<int>("tracker.min_inliers"), options.min_inliers);
   EXPECT_EQ(settings.Get<int>("tracker.max_local_keyframes"), options.max_local_keyframes);
   EXPECT_EQ(settings.Get<double>("tracker.max_lost_s"), 1e-6 * static_cast<double>(options.max_lost_us));

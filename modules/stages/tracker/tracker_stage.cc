@@ -13,7 +13,6 @@ constexpr std::chrono::milliseconds kAskAgain{500};
 
 MapTrackerOptions OptionsFrom(const Settings& settings) {
   MapTrackerOptions options;
-  options.sigma_px = settings.Get<double>("tracker.sigma_px");
   options.min_inliers = settings.Get<int>("tracker.min_inliers");
   options.max_local_keyframes = settings.Get<int>("tracker.max_local_keyframes");
   options.max_lost_us = std::llround(1e6 * settings.Get<double>("tracker.max_lost_s"));
