@@ -7,13 +7,13 @@ namespace tessera {
 
 void MapArchive::Begin(const Map& map) { snapshots_.push_back(map.Snapshot()); }
 
-void MapArchive::Add(std::shared_ptr<const MapDelta> delta, const Map& map) {
+void MapArchive::Add(std::shared_ptr<const MapDelta> delta, const Map& map, std::optional<int64_t> awaited) {
   const int64_t number = delta->number;
   deltas_.push_back(std::move(delta));
   if (!snapshots_.empty() && (number + 1) % kSnapshotInterval != 0) return;
   snapshots_.push_back(map.Snapshot());
   if (snapshots_.size() <= 2) return;
-  snapshots_.pop_front();
+  while (snapshots_.size() > 2 && (!awaited || snapshots_[1].number < *awaited)) snapshots_.pop_front();
   while (deltas_.front()->number <= snapshots_.front().number) deltas_.pop_front();
 }
 

@@ -23,14 +23,15 @@ class MapArchive {
 
   // The owner began with this map.
   void Begin(const Map& map);
-  // A delta was sent; `map` is the owner's after it.
-  void Add(std::shared_ptr<const MapDelta> delta, const Map& map);
+  // A delta was sent; `map` is the owner's after it. `awaited`: number of a delta that somebody is still to answer, and
+  // must find again when started anew; nullopt: none.
+  void Add(std::shared_ptr<const MapDelta> delta, const Map& map, std::optional<int64_t> awaited);
   // What to send to one who asks; `map` is the owner's, after the last delta added. Nothing if the asker lacks nothing,
   // or if there is no map yet.
   Answer AnswerTo(const MapRequest& request, const Map& map);
 
-  // A snapshot is taken of the first delta, and then this often, in deltas. The one handed out is between one and two such
-  // intervals old, or of the beginning: older than what the mapper still waits for from anybody.
+  // A snapshot is taken of the first delta, and then this often, in deltas. The one handed out is of the beginning, or
+  // between one and two such intervals old, or else the last before the awaited delta.
   static constexpr int64_t kSnapshotInterval = 48;
   // Deltas sent for one request; who lacks more asks again.
   static constexpr size_t kMaxDeltas = 16;

@@ -24,9 +24,9 @@ class Owner {
     archive_.Begin(map_);
   }
 
-  MapFollower::Delta Next() {
+  MapFollower::Delta Next(std::optional<int64_t> awaited = std::nullopt) {
     auto delta = std::make_shared<const MapDelta>(RandomChange(map_, generator_));
-    archive_.Add(delta, map_);
+    archive_.Add(delta, map_, awaited);
     return delta;
   }
   MapArchive::Answer AnswerTo(const MapRequest& request) { return archive_.AnswerTo(request, map_); }
@@ -255,6 +255,19 @@ TEST(MapArchive, TheBaseSnapshotIsOldAndAllDeltasSinceAreThere) {
     owner.Next();
     ExpectOldBaseWithAllDeltasSince(owner, i);
   }
+}
+
+TEST(MapArchive, TheBaseSnapshotIsOlderThanWhatIsAwaited) {
+  Owner owner(12);
+  for (int64_t i = 0; i < 60; ++i) owner.Next();
+  for (int64_t i = 0; i < 300; ++i) owner.Next(60);
+  const std::optional<MapSnapshotPage> page = owner.AnswerTo({}).page;
+  ASSERT_TRUE(page.has_value());
+  EXPECT_LT(page->part.number, 60);
+  EXPECT_GE(page->part.number, 60 - 2 * MapArchive::kSnapshotInterval);
+  EXPECT_FALSE(owner.AnswerTo({.next_delta = 60}).page.has_value()) << "the awaited delta itself is gone";
+  for (int64_t i = 0; i < MapArchive::kSnapshotInterval; ++i) owner.Next();
+  ExpectOldBaseWithAllDeltasSince(owner, 300);
 }
 
 TEST(MapArchive, BeginsWithALoadedMap) {

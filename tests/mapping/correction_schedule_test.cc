@@ -11,7 +11,7 @@ namespace tessera {
 namespace {
 
 constexpr int64_t kFirstDelta = 100;  // of the delta that answers keyframe 0
-constexpr CorrectionDelays kDelays{.loop_keyframes = 3, .adjustment_keyframes = 5};
+constexpr CorrectionDelays kDelays{.loop_keyframes = 3, .adjustment_keyframes = 5, .adjustment_growth = 1000};
 
 // Keyframes 4, 11, 18, ... close a loop; the others don't.
 LoopResult ResultOf(int64_t keyframe) {
@@ -59,7 +59,7 @@ class MapperRun {
  private:
   void Note(int64_t k, const DueCorrections& due) {
     wants_ |= !due.loops.empty();
-    if (!wants_ || schedule_.is_asked()) return;
+    if (!wants_ || schedule_.asked_delta()) return;
     schedule_.Ask({k}, k + kFirstDelta);
     wants_ = false;
   }
@@ -133,13 +133,13 @@ TEST(CorrectionSchedule, AnAdjustmentIsDueExactlyAfterItsDelay) {
   schedule.Receive(AdjustmentOf(10));  // nobody asked yet
   (void)schedule.Take({10});
   schedule.Ask({10}, 10 + kFirstDelta);
-  EXPECT_TRUE(schedule.is_asked());
+  EXPECT_EQ(schedule.asked_delta(), 10 + kFirstDelta);
   for (int64_t k = 11; k < 15; ++k) {
     ASSERT_TRUE(schedule.CanProcess({k}));
     EXPECT_FALSE(schedule.Take({k}).adjustment.has_value()) << k;
   }
   EXPECT_TRUE(schedule.Take({15}).adjustment.has_value());
-  EXPECT_FALSE(schedule.is_asked());
+  EXPECT_FALSE(schedule.asked_delta().has_value());
   schedule.Ask({15}, 15 + kFirstDelta);
   EXPECT_TRUE(schedule.CanProcess({19}));
   EXPECT_FALSE(schedule.CanProcess({20})) << "an adjustment for keyframe 15 is missing";
@@ -150,6 +150,17 @@ TEST(CorrectionSchedule, AnAdjustmentIsDueExactlyAfterItsDelay) {
 }
 
 // A mapper that was started again gets all that was ever sent before its first keyframe.
+TEST(CorrectionSchedule, TheAdjustmentOfALargerMapGetsMoreTime) {
+  for (const int64_t asked : {15, 16, 160}) {
+    CorrectionSchedule schedule({.loop_keyframes = 1000, .adjustment_keyframes = 5, .adjustment_growth = 16});
+    schedule.Ask({asked}, asked + kFirstDelta);
+    schedule.Receive(AdjustmentOf(asked));
+    const int64_t due = asked + 5 + asked / 16;
+    EXPECT_FALSE(schedule.Take({due - 1}).adjustment.has_value()) << asked;
+    EXPECT_TRUE(schedule.Take({due}).adjustment.has_value()) << asked;
+  }
+}
+
 TEST(CorrectionSchedule, LaterAdjustmentsSurviveTheTakingOfEarlierOnes) {
   CorrectionSchedule schedule(kDelays);
   for (int64_t k = 0; k < 30; ++k) schedule.Receive(ResultOf(k));

@@ -49,6 +49,7 @@ TEST(DefaultSettings, OfLoops) {
   EXPECT_EQ(settings.Get<int>("loop_closer.min_relocalized"), options.relocalization.min_seen);
   EXPECT_EQ(settings.Get<int>("mapper.loop_delay_keyframes"), CorrectionDelays{}.loop_keyframes);
   EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_keyframes"), CorrectionDelays{}.adjustment_keyframes);
+  EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_growth"), CorrectionDelays{}.adjustment_growth);
   EXPECT_EQ(settings.Get<int>("global_adjuster.iterations"), GlobalBundleOptions().max_num_iterations);
 }
 

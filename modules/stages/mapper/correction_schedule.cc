@@ -21,7 +21,9 @@ bool CorrectionSchedule::HasLoopsUpTo(KeyframeId id) const {
 }
 
 bool CorrectionSchedule::IsAdjustmentDue(KeyframeId id) const {
-  return asked_ && id.value >= asked_->keyframe.value + delays_.adjustment_keyframes;
+  if (!asked_) return false;
+  const int64_t asked = asked_->keyframe.value;
+  return id.value >= asked + delays_.adjustment_keyframes + asked / delays_.adjustment_growth;
 }
 
 bool CorrectionSchedule::CanProcess(KeyframeId id) const {

@@ -1,6 +1,9 @@
 // When the mapper applies what the loop closer and the global adjuster found. The law of logical time: before keyframe k
 // it applies exactly the loop results of keyframes <= k - E; an adjustment that keyframe a asked for, before keyframe
-// a + G. What comes early is held back, what is missing is waited for.
+//
+//   a + G + a / g                                     a larger map takes longer to adjust: g bounds the growth
+//
+// What comes early is held back, what is missing is waited for.
 #pragma once
 
 #include <map>
@@ -20,6 +23,7 @@ struct DueCorrections {
 struct CorrectionDelays {
   int64_t loop_keyframes = 6;        // E
   int64_t adjustment_keyframes = 40; // G
+  int64_t adjustment_growth = 8;     // g: what a map takes to be adjusted, where keyframes come at 5 Hz, and half as much again
 };
 
 class CorrectionSchedule {
@@ -42,8 +46,8 @@ class CorrectionSchedule {
   // The same at the end, when `last` was the last keyframe: everything that was asked for is due.
   bool CanFinish(KeyframeId last) const;
   DueCorrections TakeAll(KeyframeId last);
-  // Whether an adjustment is still on its way.
-  bool is_asked() const { return asked_.has_value(); }
+  // Number of the delta that asked for an adjustment which is still on its way; nullopt: none is.
+  std::optional<int64_t> asked_delta() const { return asked_ ? std::optional(asked_->delta) : std::nullopt; }
 
  private:
   struct Asked {

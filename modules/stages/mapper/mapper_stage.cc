@@ -32,11 +32,13 @@ MapperOptions OptionsFrom(const Settings& settings) {
 
 CorrectionDelays DelaysFrom(const Settings& settings) {
   const CorrectionDelays delays{settings.Get<int>("mapper.loop_delay_keyframes"),
-                                settings.Get<int>("mapper.adjustment_delay_keyframes")};
-  if (delays.loop_keyframes < 1 || delays.adjustment_keyframes < 1 ||
-      std::max(delays.loop_keyframes, delays.adjustment_keyframes) >= MapArchive::kSnapshotInterval) {
-    throw InputError("mapper.loop_delay_keyframes and mapper.adjustment_delay_keyframes must be between 1 and " +
-                     std::to_string(MapArchive::kSnapshotInterval - 1));
+                                settings.Get<int>("mapper.adjustment_delay_keyframes"),
+                                settings.Get<int>("mapper.adjustment_delay_growth")};
+  if (delays.loop_keyframes < 1 || delays.loop_keyframes >= MapArchive::kSnapshotInterval) {
+    throw InputError("mapper.loop_delay_keyframes must be between 1 and " + std::to_string(MapArchive::kSnapshotInterval - 1));
+  }
+  if (delays.adjustment_keyframes < 1 || delays.adjustment_growth < 1) {
+    throw InputError("mapper.adjustment_delay_keyframes and mapper.adjustment_delay_growth must be at least 1");
   }
   return delays;
 }
@@ -115,7 +117,7 @@ void MapperStage::ProcessWaiting() {
 void MapperStage::Publish(MapDelta&& delta) {
   if (delta.asks_adjustment) schedule_.Ask(delta.answers, delta.number);
   const auto shared = std::make_shared<const MapDelta>(std::move(delta));
-  archive_.Add(shared, mapper_.map());
+  archive_.Add(shared, mapper_.map(), schedule_.asked_delta());
   deltas_.Publish(*shared);
   context_.SetValue("keyframes", static_cast<double>(mapper_.map().keyframes().size()));
   context_.SetValue("landmarks", static_cast<double>(mapper_.map().landmarks().size()));
