@@ -7,9 +7,9 @@ from pathlib import Path
 from tessera_cli import plot
 from tessera_cli.errors import RunFailed
 from tessera_cli.files import write_text
+from tessera_cli.lan.private_deputy import PrivateDeputy
 from tessera_cli.report import write_report
 from tessera_cli.run_folder import Result, default_alignment, read_run
-from tessera_cli.stack import Stack
 from tessera_cli.versions import collect_versions
 
 # What the evaluator's run.json hands over as it is.
@@ -31,7 +31,7 @@ class RunFacts:
     messages_undecodable: int
 
 
-def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
+def summarize(folder: Path, facts: RunFacts, deputy: PrivateDeputy) -> dict:
     """Writes summary.json, trajectory.png and report.html, and returns the summary. Raises RunFailed if the evaluator wrote nothing."""
     evaluated = _read_evaluation(folder)
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
@@ -43,11 +43,11 @@ def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
         alignment=_in_words(result),
         wall_s=round(facts.wall_s, 3),
         frames_per_s=round(evaluated["frames"] / facts.wall_s, 3) if facts.wall_s > 0 else None,
-        cpu_s={name: round(process.cpu_s, 3) for name, process in stack.processes.items()},
-        max_rss_mb={name: round(process.max_rss_mb, 1) for name, process in stack.processes.items()},
+        cpu_s={process.name: round(process.cpu_s, 3) for process in deputy.processes},
+        max_rss_mb={process.name: round(process.max_rss_mb, 1) for process in deputy.processes},
         messages_undecodable=facts.messages_undecodable,
-        extractor_restarts=stack.num_extractor_restarts,
-        warnings=stack.warnings,
+        extractor_restarts=deputy.num_restarts("extractor"),
+        warnings=deputy.warnings,
         versions=collect_versions(),
     )
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
