@@ -1,4 +1,4 @@
-"""All processes of one run. Extractors that die, and stages of the map that are killed, are started again; any other death ends the run."""
+"""All processes of one run. Extractors that die, and stages that are killed, are started again, but for tracker and evaluator, whose death ends it."""
 
 import time
 from pathlib import Path
@@ -15,7 +15,7 @@ STABLE_AFTER_S = 10.0
 # One that dies so often in a row has a fault that starting it again does not mend.
 MAX_DEATHS_IN_A_ROW = 6
 # Stages that build their state again when they were killed.
-REBUILT = ("mapper", "loop_closer", "global_adjuster")
+REBUILT = ("mapper", "loop_closer", "global_adjuster", "reassembler", "dispatcher", "camera")
 # What SIGTERM has not ended after this long is killed.
 STOP_TIMEOUT_S = 5.0
 
