@@ -9,6 +9,7 @@
 #include <memory>
 #include <random>
 #include <stdexcept>
+#include <vector>
 
 #include "mapping/planted_map.h"
 #include "stages/mapper/map_bending.h"
@@ -139,6 +140,41 @@ TEST(LoopCloser, RefusesAPlaceThatOnlyLooksAlike) {
   EXPECT_EQ(loop.num_aligned, 0);
   EXPECT_TRUE(loop.corrections.empty());
   EXPECT_TRUE(loop.seen.empty());
+}
+
+// A car of the same make parked at another place: a quarter of the image is as it was, and the rest is not.
+void KeepTheLeft(FeatureFrame& features) {
+  std::vector<size_t> others;
+  for (size_t i = 0; i < features.keypoints.size(); ++i) {
+    if (features.keypoints[i].x_px > 240.0F) others.push_back(i);
+  }
+  std::mt19937 generator(5);
+  for (size_t i = others.size(); i > 1; --i) {
+    std::swap(features.descriptors[others[i - 1]], features.descriptors[others[generator() % i]]);
+  }
+}
+
+TEST(LoopCloser, RefusesAThingThatStandsInTwoPlaces) {
+  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
+    SyntheticWorld world(sensor, 0.3);
+    PlantedMap planted(world);
+    PlantTwoVisits(planted, Away(1.0), KeepTheLeft);
+    const LoopResult loop = CloserOf(planted).FindLoop({2 * kVisit - 1});
+    EXPECT_GT(loop.num_aligned, 0) << "what is the same agrees with a pose";
+    EXPECT_FALSE(loop.matched.valid());
+
+    LoopCloserOptions credulous;
+    credulous.verification.min_coverage = 0.0;
+    LoopCloser closer(ShippedVocabulary(), credulous);
+    for (const MapDelta& delta : planted.deltas()) ASSERT_EQ(closer.ApplyDelta(delta), "");
+    EXPECT_TRUE(closer.FindLoop({2 * kVisit - 1}).matched.valid());
+
+    RelocalizationRequest request;
+    request.features = *planted.map().FindKeyframe({2 * kVisit - 1})->features;
+    LoopCloser of_first(ShippedVocabulary(), {});
+    for (int64_t k = 0; k < kVisit; ++k) ASSERT_EQ(of_first.ApplyDelta(planted.deltas()[static_cast<size_t>(k)]), "");
+    EXPECT_FALSE(of_first.Relocalize(request).reference.valid());
+  }
 }
 
 TEST(LoopCloser, NoLoopOnTheFirstVisitNorForAKeyframeThatIsGone) {

@@ -47,6 +47,8 @@ TEST(DefaultSettings, OfLoops) {
   EXPECT_EQ(settings.Get<int>("loop_closer.min_aligned"), options.verification.similarity.min_inliers);
   EXPECT_EQ(settings.Get<int>("loop_closer.min_seen"), options.verification.min_seen);
   EXPECT_EQ(settings.Get<int>("loop_closer.min_relocalized"), options.relocalization.min_seen);
+  EXPECT_EQ(settings.Get<double>("loop_closer.min_coverage"), options.verification.min_coverage);
+  EXPECT_EQ(settings.Get<double>("loop_closer.min_coverage"), options.relocalization.min_coverage);
   EXPECT_EQ(settings.Get<int>("mapper.loop_delay_keyframes"), CorrectionDelays{}.loop_keyframes);
   EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_keyframes"), CorrectionDelays{}.adjustment_keyframes);
   EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_growth"), CorrectionDelays{}.adjustment_growth);

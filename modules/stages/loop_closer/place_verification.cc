@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <set>
 
 #include "map/neighbourhood.h"
 #include "tracking/frame_pose.h"
@@ -66,6 +67,7 @@ std::string VerificationOptions::Check() const {
   if (min_matches < 3 || min_seen < 6 || num_neighbours < 1) {
     return "the loop closer must ask for at least 3 matches and 6 landmarks seen";
   }
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "the loop closer's min_coverage must lie between 0 and 1";
   for (const std::string& sentence : {similarity.Check(), guided.Check()}) {
     if (!sentence.empty()) return sentence;
   }
@@ -85,6 +87,31 @@ int PlaceAmong(const PlacedPoints& points, const MatchOptions& matching, const P
   frame.points.assign(frame.points.size(), {});
   MatchLocal(points, matching.local_radius_px, matching, frame);
   return OptimizeFrame(pose, frame);
+}
+
+double Coverage(const PlacedPoints& points, const TrackedFrame& frame) {
+  constexpr int kCellsAcross = 16, kMinExpected = 3;
+  const CameraCalibration& camera = frame.view->calibration();
+  const double cell_px = static_cast<double>(camera.width_px) / kCellsAcross;
+  const auto cell_of = [&](const Eigen::Vector2d& pixel_px) {
+    return kCellsAcross * static_cast<int>(pixel_px.y() / cell_px) + static_cast<int>(pixel_px.x() / cell_px);
+  };
+  std::map<int, int> num_expected;
+  const View view(camera, frame.world_from_camera);
+  for (const auto& [id, landmark] : points) {
+    if (const std::optional<ExpectedView> expected = Expect(view, landmark)) ++num_expected[cell_of(expected->pixel_px)];
+  }
+  std::set<int> shown;
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (frame.points[i].valid()) shown.insert(cell_of(frame.view->observation(static_cast<int>(i)).pixel_px));
+  }
+  int num_cells = 0, num_shown = 0;
+  for (const auto& [cell, num] : num_expected) {
+    if (num < kMinExpected) continue;
+    ++num_cells;
+    num_shown += shown.contains(cell) ? 1 : 0;
+  }
+  return num_cells > 0 ? static_cast<double>(num_shown) / num_cells : 0.0;
 }
 
 std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& places, KeyframeId current_id,
@@ -110,6 +137,7 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
   const PlacedPoints landmarks = LandmarksAround(map, candidate, options.num_neighbours);
   frame.world_from_camera = (Sim3::From(matched.world_from_camera) * aligned->first_from_second).Pose();
   if (PlaceAmong(landmarks, options.guided, {}, frame) < options.min_seen) return std::nullopt;
+  if (Coverage(landmarks, frame) < options.min_coverage) return std::nullopt;
   const SimilarityEstimate refined = RefineSimilarity(camera, PairsOf(map, frame, matched, current),
                                                       aligned->first_from_second, similarity);
   if (refined.num_inliers < similarity.min_inliers) return std::nullopt;

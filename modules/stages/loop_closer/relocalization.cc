@@ -37,6 +37,7 @@ std::string RelocalizationOptions::Check() const {
   if (min_matches < 4 || min_seen < 6 || num_neighbours < 1) {
     return "a lost camera needs at least 4 matches and 6 landmarks seen to be found again";
   }
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage of relocalisation must lie between 0 and 1";
   return guided.Check();
 }
 
@@ -57,6 +58,7 @@ RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, con
     frame.world_from_camera = *pose;
     const PlacedPoints landmarks = LandmarksAround(map, id, options.num_neighbours);
     if (PlaceAmong(landmarks, options.guided, {}, frame) < options.min_seen) continue;
+    if (Coverage(landmarks, frame) < options.min_coverage) continue;
     answer.reference = id;
     answer.reference_from_camera = (keyframe.WorldFromKeyframe().Inverse() * frame.world_from_camera).Pose();
     for (size_t i = 0; i < frame.points.size(); ++i) {

@@ -21,6 +21,7 @@ struct RelocalizationOptions {
   int num_neighbours = 15;          // of the place, whose landmarks are then looked for
   MatchOptions guided{.local_radius_px = 8.0};
   int min_seen = 50;                // of the place's landmarks that the image must show
+  double min_coverage = 0.4;        // and its share of the image, see Coverage()
   double sigma_px = kKeypointSigmaPx;
 
   // Empty if all is well, else one sentence.
@@ -29,7 +30,7 @@ struct RelocalizationOptions {
 
 // Asks the places that look alike one after the other: matches by the vocabulary's words, the pose of three points
 // (RANSAC, seeded by the frame's number), then all landmarks of the place around that pose, which must agree with min_seen
-// of them. The first place that does is the answer. As in ORB-SLAM (Mur-Artal et al. 2015).
+// of them, all over the image. The first place that does is the answer. As in ORB-SLAM (Mur-Artal et al. 2015).
 RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, const Vocabulary& vocabulary,
                                 const RelocalizationRequest& request, const CandidateOptions& candidates,
                                 const RelocalizationOptions& options);
