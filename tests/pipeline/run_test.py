@@ -215,6 +215,16 @@ def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence):
     assert "--port" in second.err
 
 
+def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tessera, sequence):
+    port, folder = tessera.next_port(), tessera.next_folder()
+    first = tessera.start("run", f"kitti:{sequence}", "--port", port, "--out", folder)
+    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    second = tessera.command("run", f"kitti:{sequence}", "--port", tessera.next_port(), "--out", folder)
+    assert second.status == 2 and f"another run writes into {folder}" in second.err, second.out + second.err
+    out, _ = first.communicate(timeout=RUN_TIMEOUT_S)
+    assert first.returncode == 0, out
+
+
 @pytest.fixture(scope="module")
 def log(tessera, sequence, tmp_path_factory) -> Path:
     log = tmp_path_factory.mktemp("logs") / "room 1.lcmlog"
