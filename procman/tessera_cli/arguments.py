@@ -246,31 +246,34 @@ def add_deputy_command(commands) -> None:
 
 def add_sheriff_commands(commands) -> None:
     up = add_lan_command(
-        commands, "up", "lan.commands", "Starts the processes of a list on their nodes and waits until all are ready.",
+        commands, "up", "lan.up", "Starts the processes of a list on their nodes and waits until all are ready.",
         "Exit status: 0 all are ready (or the script ended well), 1 one can't or not in time, 2 the list or the arguments are at fault.\n\n"
         "examples:\n  procman/tessera up procman/local.pmd --set camera.source=kitti:DIR --out /tmp/run\n"
-        "  procman/tessera up procman/lan.pmd --lan --script run --set camera.source=kitti:DIR --out /tmp/run\n")
+        "  procman/tessera up procman/lan.pmd --lan --script run --set camera.source=kitti:DIR --out /tmp/run\n"
+        "  procman/tessera up procman/local.pmd --name robot_a --set bus.channel_prefix=A_ --set camera.source=kitti:DIR\n")
     up.add_argument("file", metavar="FILE", help="a process list, such as procman/lan.pmd")
+    up.add_argument("--name", metavar="NAME", default="", help="of the list; a second `up` of one name replaces the first; default: its file's")
     up.add_argument("--script", metavar="NAME", help="carry out this script of the list instead")
     up.add_argument("--out", metavar="DIR", help="the run's folder, on the node of the evaluator")
     up.add_argument("--set", dest="settings", type=assignment, metavar="section.key=value", action="append", default=[],
                     help="any setting of config/default.yaml; may be repeated")
     add_timeout(up, 60)
-    down = add_lan_command(commands, "down", "lan.commands", "Stops all processes of all deputies.", "examples:\n  procman/tessera down\n")
+    down = add_lan_command(commands, "down", "lan.commands", "Stops all processes of one list, or of all lists.",
+                           "examples:\n  procman/tessera down\n  procman/tessera down robot_a\n")
+    down.add_argument("name", metavar="NAME", nargs="?", default="", help="of the list, as `tessera status` shows it; default: all")
     add_timeout(down, 60)
     status = add_lan_command(commands, "status", "lan.commands", "Nodes and processes, once; exit status 1 if one failed.",
                              "examples:\n  procman/tessera status --json\n")
     status.add_argument("--json", action="store_true", help="for programs")
-    watch = add_lan_command(commands, "watch", "lan.watch", "Nodes, processes, frame rate and output, drawn anew until Ctrl-C.",
-                            "examples:\n  procman/tessera watch\n")
-    watch.add_argument("--prefix", metavar="TEXT", default="", help="the channel prefix of the stack whose poses are counted")
+    add_lan_command(commands, "watch", "lan.watch", "Nodes, processes, frame rates and output, drawn anew until Ctrl-C.",
+                    "examples:\n  procman/tessera watch\n")
     restart = add_lan_command(commands, "restart", "lan.commands", "Ends a process and starts it again; waits until it is ready.",
                               "examples:\n  procman/tessera restart mapper\n")
-    restart.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")
+    restart.add_argument("name", metavar="[LIST/]NAME", help="of the process, as `tessera status` shows it")
     add_timeout(restart, 60)
     log = add_lan_command(commands, "log", "lan.commands", "The last lines that a process wrote, from its node.",
                           "examples:\n  procman/tessera log tracker --follow\n")
-    log.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")
+    log.add_argument("name", metavar="[LIST/]NAME", help="of the process, as `tessera status` shows it")
     log.add_argument("--lines", type=whole_number(1, 10000), metavar="N", default=50, help="default 50")
     log.add_argument("--follow", action="store_true", help="and what it writes from now on, until Ctrl-C")
 

@@ -53,6 +53,22 @@ def test_a_script_runs_the_whole_stack_on_one_machine(make_node, sequence, refer
     assert node.marked() == []
 
 
+def test_two_robots_have_a_stack_each_on_one_deputy(make_node, sequence, reference, tmp_path):
+    node = make_node(deputy=os.uname().nodename).start()
+    lines = {name: node.line(*run_script(node, "local.pmd", sequence, tmp_path / name, "--name", name, "--set", f"bus.channel_prefix={name}_"))
+             for name in ("A", "B")}
+    scripts = [subprocess.Popen(line, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for line in lines.values()]
+    try:
+        for script in scripts:
+            assert script.wait(120) == 0, script.stdout.read()
+    finally:
+        for script in scripts:
+            script.kill()
+    for name in lines:
+        must_equal(tmp_path / name, reference)
+    assert node.marked() == []
+
+
 def test_a_stage_that_says_nothing_hangs_and_is_started_again(make_node):
     node = make_node().start()
     assert node.up('cmd "extractor" { host = "node1"; hang_timeout_s = 2; }').returncode == 0
