@@ -216,6 +216,19 @@ def add_keys_command(commands) -> None:
     revoke.add_argument("name", metavar="NAME")
 
 
+def add_deploy_command(commands) -> None:
+    deploy = add_command(
+        commands, "deploy", "lan.deploy", "Copies the sources to nodes by ssh and rsync, and tells what each of them lacks.",
+        "NODE is [USER@]HOST or [USER@]HOST:FOLDER; the folder is `tessera` in the home folder where it is left out. Copied is what git tracks.\n"
+        "Exit status: 0 all nodes are ready, 1 one is not, 2 the arguments are at fault.\n\nexamples:\n"
+        "  procman/tessera deploy pi@board1 pi@board2 --setup\n  procman/tessera deploy node2:/opt/tessera --built --dry-run\n")
+    deploy.add_argument("nodes", metavar="NODE", nargs="+", help="see below")
+    deploy.add_argument("--built", action="store_true", help="the programs of this machine too, for nodes of its CPU type and system")
+    deploy.add_argument("--setup", action="store_true", help="then run `procman/tessera setup` there, which asks before it uses sudo")
+    deploy.add_argument("--dry-run", action="store_true", help="look, and change nothing")
+    deploy.add_argument("--ssh", metavar="COMMAND", default="ssh", help="default ssh; such as 'ssh -p 2222 -i KEY'")
+
+
 def add_lan_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lan", action="store_true",
                         help="speak to the network (ttl 1), not to this machine alone; TESSERA_LAN=1 in the environment does the same")
@@ -288,4 +301,5 @@ def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     add_deputy_command(commands)
     add_sheriff_commands(commands)
     add_keys_command(commands)
+    add_deploy_command(commands)
     return parser.parse_args(arguments)
