@@ -167,10 +167,12 @@ def add_look_commands(commands) -> None:
     keep_map = add_command(
         commands, "map", "keep_map", "Joins a running stack and writes its map as a cloud of points (PLY).",
         "Any viewer of point clouds opens the file: MeshLab, CloudCompare, Blender.\n\nexamples:\n"
-        "  procman/tessera map /tmp/now.ply\n  procman/tessera map /tmp/whole.ply --follow\n")
+        "  procman/tessera map /tmp/now.ply\n  procman/tessera map /tmp/whole.ply --follow\n"
+        "  procman/tessera map /tmp/robot_b.ply --prefix B_ --lan\n")
     keep_map.add_argument("path", metavar="OUT.ply", help="the file to write")
     keep_map.add_argument("--follow", action="store_true", help="write when the run has ended, not at once")
-    add_port(keep_map)
+    keep_map.add_argument("--prefix", metavar="TEXT", default="", help="the stack's bus.channel_prefix, where it has one")
+    add_lan_options(keep_map)
     experiment = add_command(commands, "experiment", "experiment", "Measurements, as a table, a CSV file and a plot under logs/.",
                              "examples:\n  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n")
     experiment.add_argument("name", metavar="NAME", choices=("extraction", "places", "worlds"),

@@ -201,7 +201,7 @@ class Deputy:
         launches = {}
         for wish in order.wishes:
             name = qualify(order.list, wish.name)
-            launches[name] = to_launch(order.list, wish, self._commands, values, run, generations.get(name, 0))
+            launches[name] = to_launch(wish, self._commands, values, run, generations.get(name, 0), order.list)
         if order.list not in self._lists or run != self._lists[order.list].run:
             self._begin(order.list, run, order.settings)
         self._forget_ended(order.list)

@@ -8,7 +8,8 @@ LIST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,47}")  # also the name of a fold
 
 
 def qualify(list_name: str, process: str) -> str:
-    return f"{list_name}/{process}"
+    """A list without a name adds nothing."""
+    return f"{list_name}/{process}" if list_name else process
 
 
 def split(name: str) -> tuple[str, str]:

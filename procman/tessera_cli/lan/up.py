@@ -14,9 +14,6 @@ from tessera_cli.lan.procman_bus import ttl_of
 from tessera_cli.lan.script import ScriptRunner
 from tessera_cli.lan.sheriff import Sheriff
 
-# A message that fits one packet of a LAN: the loss of a fragment would lose it whole.
-LAN_MESSAGE_BYTES = 1400
-
 
 def main(arguments: Namespace) -> int:
     process_list = read_process_list(Path(arguments.file))
@@ -52,11 +49,8 @@ def _name(arguments: Namespace) -> str:
 
 def _assignments(process_list: ProcessList, arguments: Namespace) -> list[str]:
     """All settings of the run that differ from the defaults."""
-    assignments = settings.port_assignments(arguments.port)
-    if ttl_of(arguments):
-        assignments = [text.replace("?ttl=0", "?ttl=1") for text in assignments]
-        assignments += [f"bus.tile_url=udpm://{settings.GROUP}:{{port}}?ttl=1", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
-    assignments += process_list.settings
+    make = settings.lan_assignments if ttl_of(arguments) else settings.port_assignments
+    assignments = make(arguments.port) + process_list.settings
     if arguments.out:
         assignments.append(f"evaluator.out_dir={Path(arguments.out).expanduser().absolute()}")
     return assignments + arguments.settings
