@@ -45,5 +45,6 @@ def _describe(member: Supervised, now: float) -> procman_process_t:
     process.num_starts = member.num_starts
     if member.child:
         process.pid, process.up_s = member.child.pid, now - member.started_at
-        process.cpu_percent, process.rss_mb = member.usage.cpu_percent, member.usage.rss_mb
+        usage = member.usage
+        process.cpu_percent, process.cpu_s, process.rss_mb = usage.cpu_percent, usage.total_cpu_s, usage.rss_mb
     return process

@@ -52,10 +52,18 @@ class Sheriff:
         self._is_lan = bool(ttl_of(arguments))
         self._bus = Bus(procman_url(arguments), f"sheriff_{os.getpid()}")
         self._bus.subscribe(STATUS, procman_status_t, self._on_status)
+        self._others: list[Bus] = []
         self.deputies: dict[str, Heard] = {}
 
     def _on_status(self, status: procman_status_t) -> None:
         self.deputies[status.deputy] = Heard(status, time.monotonic())
+
+    def on_status(self, handler: Callable[[procman_status_t], None]) -> None:
+        self._bus.subscribe(STATUS, procman_status_t, handler)
+
+    def also_listen_to(self, buses: list[Bus]) -> None:
+        """While it listens to deputies; instead of those given before."""
+        self._others = buses
 
     def on_output(self, handler: Callable[[procman_output_t], None]) -> None:
         self._bus.subscribe(OUTPUT, procman_output_t, handler)
@@ -63,8 +71,8 @@ class Sheriff:
     def listen(self, seconds: float) -> None:
         until = time.monotonic() + seconds
         while (left_s := until - time.monotonic()) > 0:
-            if select.select([self._bus], [], [], left_s)[0]:
-                self._bus.handle_waiting()
+            for bus in select.select([self._bus, *self._others], [], [], left_s)[0]:
+                bus.handle_waiting()
 
     def meet(self) -> None:
         """Hears every deputy once."""

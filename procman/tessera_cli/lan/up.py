@@ -12,6 +12,7 @@ from tessera_cli.lan.names import LIST
 from tessera_cli.lan.process_list import ProcessList, read_process_list
 from tessera_cli.lan.procman_bus import ttl_of
 from tessera_cli.lan.script import ScriptRunner
+from tessera_cli.lan.script_run import ScriptRun
 from tessera_cli.lan.sheriff import Sheriff
 
 
@@ -30,8 +31,11 @@ def main(arguments: Namespace) -> int:
     runner.leave_other_hosts()
     began = time.monotonic()
     if arguments.script:
+        run = ScriptRun(sheriff, name, assignments, values)
         runner.carry_out(arguments.script)
         say(f"script {arguments.script} ended well after {time.monotonic() - began:.1f} s")
+        if words := run.sum_up():
+            print(words)
         return 0
     names = list(process_list.processes)
     runner.start(names)

@@ -7,17 +7,14 @@ from collections import deque
 
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.lan.commands import describe_list, print_status
-from tessera_cli.lan.procman_bus import Bus
+from tessera_cli.lan.list_view import ListView
 from tessera_cli.lan.sheriff import Sheriff
 from tessera_cli.lan.supervised import STATE_NAMES
-from tessera_cli.panel import describe_time
-from tessera_cli.progress import Progress
-from tessera_cli.types import pose_t, procman_output_t, procman_process_t, stage_status_t
+from tessera_cli.types import procman_output_t, procman_process_t, stage_status_t
 
 PANEL_PERIOD_S = 0.5
 LINES_PERIOD_S = 5.0
 NUM_LINES = 6
-TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
 STYLES = {procman_process_t.READY: "green", procman_process_t.FINISHED: "green", procman_process_t.FAILED: "bold red",
           procman_process_t.BACKING_OFF: "yellow", procman_process_t.WAITING: "yellow", procman_process_t.STARTING: "yellow"}
 
@@ -26,38 +23,6 @@ def main(arguments: Namespace) -> int:
     watcher = Watcher(arguments)
     interrupt = Interrupt()
     return watcher.draw_until(interrupt) if sys.stdout.isatty() else watcher.print_until(interrupt)
-
-
-class ListView:
-    """What the stages of one list say on their own bus, whichever node they are on."""
-
-    def __init__(self, main_url: str, channel_prefix: str):
-        self.bus = Bus(main_url, "watch")
-        self.bus.subscribe(channel_prefix + "STATUS", stage_status_t, self._on_stage)
-        self.bus.subscribe(channel_prefix + "POSE", pose_t, self._on_pose)
-        self.statuses: dict[tuple[str, int], stage_status_t] = {}  # by name and process
-        self._progress = Progress()
-
-    def _on_stage(self, status: stage_status_t) -> None:
-        self.statuses[status.name, status.pid] = status
-        values = dict(zip(status.value_names, status.values))
-        if status.name == "camera" and values.get("num_frames", 0) > 0:
-            self._progress.num_frames = int(values["num_frames"])
-
-    def _on_pose(self, pose: pose_t) -> None:
-        if pose.header.publisher == "tracker" and pose.state in TRACKING_STATES:
-            if pose.frame <= self._progress.last_frame:  # another run has begun
-                self._progress = Progress(num_frames=self._progress.num_frames)
-            self._progress.add_pose(pose.frame, TRACKING_STATES[pose.state])
-
-    def in_words(self) -> str:
-        """Empty if it has no pose yet."""
-        progress = self._progress
-        if progress.num_poses == 0:
-            return ""
-        of_all = f" of {progress.num_frames}" if progress.num_frames else ""
-        return (f"frame {progress.last_frame + 1}{of_all}, {progress.frames_per_s:.1f}/s, {describe_time(progress.time_left_s)} left, "
-                f"{progress.tracking_state}")
 
 
 class Watcher:
@@ -76,14 +41,13 @@ class Watcher:
         wanted = {(each.name, each.main_url, each.channel_prefix)
                   for heard in self._sheriff.deputies.values() for each in heard.status.lists}
         self._views = {key: self._views.get(key) or ListView(*key[1:]) for key in sorted(wanted)}
+        self._sheriff.also_listen_to([view.bus for view in self._views.values()])
 
     def _listen(self, seconds: float) -> None:
         until = time.monotonic() + seconds
         while (left_s := until - time.monotonic()) > 0:
             self._sheriff.listen(min(left_s, 0.05))
             self._follow_lists()
-            for view in self._views.values():
-                view.bus.handle_waiting()
 
     def print_until(self, interrupt: Interrupt) -> int:
         """For logs and pipes."""

@@ -28,7 +28,10 @@ def to_wish(process: Process) -> procman_wish_t:
 
 def to_launch(wish: procman_wish_t, commands: dict[str, LocalCommand], values: dict[str, str], run: str, generation: int,
               list_name: str = "") -> Launch:
-    """`values`: of the placeholders, but for the process's own. `list_name`: empty where there is but one list. Raises UserError for a wish that can't be granted."""
+    """`values`: of the placeholders, but for the process's own. `list_name`: empty where there is but one list.
+
+    Raises UserError for a wish that can't be granted.
+    """
     if not NAME.fullmatch(wish.name) or not 0 <= wish.instance < MAX_INSTANCES:
         raise UserError(f"'{wish.name}' with number {wish.instance} is no process that this deputy could name.")
     command = commands.get(wish.command)
