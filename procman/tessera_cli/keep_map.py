@@ -9,15 +9,16 @@ from pathlib import Path
 from tessera_cli import settings
 from tessera_cli.bus import BusListener
 from tessera_cli.errors import RunFailed, UserError
-from tessera_cli.files import BIN
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.lan.private_deputy import PrivateDeputy, helper
 from tessera_cli.lan.procman_bus import ttl_of
-from tessera_cli.processes import StageProcess
+from tessera_cli.lan.state_folder import LogFolder
 from tessera_cli.progress import FINISHED
 
 # A living stage tells its status twice a second.
 SILENT_BUS_S = 5.0
 LISTEN_MS = 50
+STOP_TIME_S = 5.0
 
 
 def main(arguments: Namespace) -> int:
@@ -36,31 +37,31 @@ def main(arguments: Namespace) -> int:
 
 def _write_map(values: dict, folder: Path) -> None:
     # Several may listen at once, each under a name of its own.
-    command = [str(BIN / "tessera-map-writer"), "--settings", str(folder / "settings.yaml"), "--name", f"map_writer_{os.getpid()}"]
-    writer = StageProcess("map_writer", command, folder / "map_writer.log")
-    bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], lambda pid: pid in writer.pids)
+    name = f"map_writer_{os.getpid()}"
+    deputy = PrivateDeputy(LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper(name, "map_writer", STOP_TIME_S)])
+    bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns)
     if bus.is_free():
         raise UserError("no stack runs on this bus: start one, or give its --port N and --prefix TEXT (and --lan if it is on other machines).")
     interrupt = Interrupt()
-    writer.start()
     try:
-        status = _wait(writer, bus, interrupt)
+        deputy.start()
+        _wait(deputy, bus, interrupt)
+        deputy.end()
     finally:
-        writer.kill()
-    writer.require_success(status)
-    print(f"tessera: {writer.last_words()}", flush=True)
+        deputy.kill()
+    print(f"tessera: {deputy.last_words(name)}", flush=True)
 
 
-def _wait(writer: StageProcess, bus: BusListener, interrupt: Interrupt) -> int:
-    """The exit status; 0 when the map is written."""
+def _wait(deputy: PrivateDeputy, bus: BusListener, interrupt: Interrupt) -> None:
+    """Until the map is written."""
     began = time.monotonic()
-    while (status := writer.poll()) is None:
+    while not deputy.is_over:
         bus.listen(LISTEN_MS)
+        deputy.step()
         report = next(iter(bus.progress.stages.values()), None)
         if report is not None and report.state == FINISHED:
-            return 0
+            return
         if interrupt.requested:
             raise RunFailed("interrupted before the map was written.")
         if time.monotonic() - max(began, bus.others_heard_at) > SILENT_BUS_S:
             raise RunFailed("the stack has ended before the whole map was here.")
-    return status

@@ -15,15 +15,18 @@ import lcm
 
 from tessera_cli import settings
 from tessera_cli.errors import RunFailed, UserError
-from tessera_cli.files import BIN, unfinished
+from tessera_cli.files import unfinished
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.lan.private_deputy import PrivateDeputy, helper
+from tessera_cli.lan.state_folder import LogFolder
 from tessera_cli.log_tail import LogTail
 from tessera_cli.panel import make_count
-from tessera_cli.processes import StageProcess
 from tessera_cli.sources import Source, parse_source
 from tessera_cli.types import end_of_stream_t
 
 POLL_S = 0.1
+# After Ctrl-C the camera ends its stream and what is written goes to the disk.
+STOP_TIME_S = 60.0
 
 
 def main(arguments: Namespace) -> int:
@@ -71,31 +74,28 @@ def _write_log(arguments: Namespace, source: Source, log: Path, folder: Path, in
     url = f"file://{log}?mode=w"
     assignments = settings.source_assignments(arguments, source) + settings.user_assignments(arguments)
     settings.write_settings(assignments + [f"bus.main_url={url}", f"bus.camera_url={url}"], folder / "settings.yaml")
-    camera = StageProcess("camera", [str(BIN / "tessera-camera"), "--settings", str(folder / "settings.yaml"), "--name", "camera"],
-                          folder / "camera.log")
+    deputy = PrivateDeputy(LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper("camera", "camera", STOP_TIME_S)])
     tail = LogTail(_part(log), f"{settings.prefix_of(arguments.settings)}CAMERA")
     first, last = arguments.frames
-    camera.start()
     try:
+        deputy.start()
         with make_count(f"recording {source.name}", last - first if last >= 0 else None) as view:
-            status = _wait(camera, interrupt, lambda: view.update(max(0, tail.num_frames() - first)), keep_interrupted)
+            _wait(deputy, interrupt, lambda: view.update(max(0, tail.num_frames() - first)), keep_interrupted)
+        deputy.require_success("camera")
     finally:
-        camera.kill()
-    camera.require_success(status)
+        deputy.kill()
 
 
-def _wait(camera: StageProcess, interrupt: Interrupt, show: Callable[[], None], keep_interrupted: bool) -> int:
-    """The camera's exit status."""
-    asked_to_end = False
-    while (status := camera.poll()) is None:
+def _wait(deputy: PrivateDeputy, interrupt: Interrupt, show: Callable[[], None], keep_interrupted: bool) -> None:
+    """Until the camera has ended."""
+    while not deputy.is_over:
         if interrupt.requested and not keep_interrupted:
             raise KeyboardInterrupt
-        if interrupt.requested and not asked_to_end:
-            camera.ask_to_end()
-            asked_to_end = True
+        if interrupt.requested:
+            deputy.dismiss(["camera"])
         show()
         time.sleep(POLL_S)
-    return status
+        deputy.step()
 
 
 def count_frames(log: Path, channel_prefix: str) -> int:

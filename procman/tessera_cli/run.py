@@ -1,4 +1,7 @@
-"""tessera run and replay: starts the stack, watches it to the end of the source, and writes the summary."""
+"""tessera run and replay: starts the stack, watches it to the end of the source, and writes the summary.
+
+What the stack consists of, what waits for what and what is started again is said by procman/local.pmd.
+"""
 
 import datetime
 import time
@@ -11,10 +14,13 @@ from tessera_cli.bus import BusListener
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import ROOT
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.lan.private_deputy import PrivateDeputy
+from tessera_cli.lan.process_list import read_process_list
+from tessera_cli.lan.state_folder import LogFolder
 from tessera_cli.panel import make_view
-from tessera_cli.progress import RUNNING
 from tessera_cli.sources import Source, parse_source
-from tessera_cli.stack import Stack
+
+PROCESS_LIST = ROOT / "procman" / "local.pmd"
 
 # A process that has not said by then that it runs never will; LCM's own self-test may take 10 s.
 START_TIMEOUT_S = 20.0
@@ -34,33 +40,42 @@ RUN_FILES = ("summary.json", "run.json", "report.html", "trajectory.png", "traje
 def main(arguments: Namespace, tell: Callable[[dict, Path], str] | None = None) -> int:
     """`tell`: the words of a summary and its run's folder that are printed at the end, others than the usual ones."""
     source = parse_source(arguments.source_prefix + arguments.source)
-    folder = _make_folder(arguments.out, source)
-    values = settings.write_settings(settings.run_assignments(arguments, source, folder), folder / "settings.yaml")
-    return Launcher(arguments, source, folder, values, tell).run()
+    folder = _choose_folder(arguments.out, source)
+    logs = LogFolder(folder / "stages", f"another run writes into {folder}: give another --out DIR.")
+    _remove_earlier_run(folder)
+    process_list = read_process_list(PROCESS_LIST, _counts(arguments, source))
+    assignments = process_list.settings + settings.run_assignments(arguments, source, folder)
+    values = settings.write_settings(assignments, folder / "settings.yaml")
+    deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
+    return Launcher(arguments, source, folder, values, deputy, tell).run()
 
 
-def _make_folder(out: str | None, source: Source) -> Path:
+def _counts(arguments: Namespace, source: Source) -> dict[str, int]:
+    """How many processes of the list's commands this run has, where that depends on it."""
+    return {"extractor": arguments.extractors, "recorder": int(arguments.record), "camera": int(source.has_camera_process)}
+
+
+def _choose_folder(out: str | None, source: Source) -> Path:
     now = datetime.datetime.now().strftime("%Y-%m-%d-%H%M%S")
-    folder = Path(out).expanduser().absolute() if out else ROOT / "logs" / f"{now}-{source.name}"
-    try:
-        (folder / "stages").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"the run's folder {folder} can't be made: {error.strerror}.") from error
+    return Path(out).expanduser().absolute() if out else ROOT / "logs" / f"{now}-{source.name}"
+
+
+def _remove_earlier_run(folder: Path) -> None:
     for name in RUN_FILES:
         (folder / name).unlink(missing_ok=True)
-    for log in (folder / "stages").glob("*.log"):
+    for log in (folder / "stages").glob("*.log*"):
         log.unlink()
-    return folder
 
 
 class Launcher:
-    def __init__(self, arguments: Namespace, source: Source, folder: Path, values: dict, tell: Callable[[dict, Path], str] | None):
+    def __init__(self, arguments: Namespace, source: Source, folder: Path, values: dict, deputy: PrivateDeputy,
+                 tell: Callable[[dict, Path], str] | None):
         self._arguments = arguments
         self._tell = tell
         self._source = source
         self._folder = folder
-        self._stack = Stack(folder / "settings.yaml", folder / "stages")
-        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], self._stack.owns)
+        self._deputy = deputy
+        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns)
         self._interrupt = Interrupt()
         self._num_warnings_said = 0
 
@@ -74,13 +89,13 @@ class Launcher:
                 self._start(view)
                 began = time.monotonic()
                 ended = self._watch(view)
-                self._stack.stop()
+                self._stop()
         except RunFailed as failure:
-            self._stack.stop()
+            self._stop()
             self._try_to_summarize(self._wall_s(began), str(failure))
             raise
         finally:
-            self._stack.kill()
+            self._deputy.kill()
         self._print_summary(self._wall_s(began), ended)
         return 0 if ended == "complete" or self._source.is_live else 1
 
@@ -90,34 +105,25 @@ class Launcher:
         return max(0.0, last_pose_at - began) if last_pose_at else 0.0
 
     def _start(self, view) -> None:
-        """The camera comes last: nobody misses its first frame."""
+        """Returns when all are ready but the camera, which has been started then: it depends on all others."""
         if self._source.has_camera_process and not self._bus.is_free():
             raise UserError("another stack runs on this bus: end it, or give --port N to keep the two apart.")
-        for stage in ("evaluator", "mapper", "loop_closer", "global_adjuster", "tracker", "reassembler", "dispatcher"):
-            self._stack.start(stage)
-        for instance in range(self._arguments.extractors):
-            self._stack.start("extractor", instance)
-        if self._arguments.record:
-            self._stack.start("recorder")
-        self._wait_until_running(view)
-        if self._source.has_camera_process and not self._interrupt.requested:
-            self._stack.start("camera")
-        elif not self._source.has_camera_process:
-            view.say("waiting for frames on the bus; Ctrl-C ends the run")
-
-    def _wait_until_running(self, view) -> None:
+        self._deputy.start()
         deadline = time.monotonic() + START_TIMEOUT_S
-        while waiting := self._not_yet_running():
+        while waiting := [name for name in self._deputy.not_ready if name != "camera"]:
             if self._interrupt.requested:
                 return
             if time.monotonic() > deadline:
                 raise RunFailed(f"{', '.join(waiting)} did not say within {START_TIMEOUT_S:.0f} s that it runs; "
                                 f"its log is in {self._folder / 'stages'}.")
             self._look(view)
+        if not self._source.has_camera_process:
+            view.say("waiting for frames on the bus; Ctrl-C ends the run")
 
-    def _not_yet_running(self) -> list[str]:
-        stages = self._bus.progress.stages
-        return [name for name in self._stack.processes if name not in stages or stages[name].state < RUNNING]
+    def _stop(self) -> None:
+        """The recorder goes first: the others still send it what it lacks."""
+        self._deputy.end(["recorder"])
+        self._deputy.end()
 
     def _watch(self, view) -> str:
         """Until the evaluator has everything. Returns how the run ended: "complete" or "interrupted"."""
@@ -133,8 +139,7 @@ class Launcher:
     def _drain(self, view) -> str:
         """Ends the source and lets the frames on their way arrive."""
         view.say("ending the run")
-        if "camera" in self._stack.processes:
-            self._stack.end_source()
+        self._deputy.dismiss(["camera"])
         deadline = time.monotonic() + DRAIN_TIMEOUT_S
         while not self._bus.progress.is_finished and time.monotonic() < deadline:
             self._look(view)
@@ -144,12 +149,15 @@ class Launcher:
 
     def _look(self, view) -> None:
         self._bus.listen(LISTEN_MS)
-        self._stack.check()
+        self._deputy.hear(self._bus.progress.stages.values())
+        self._deputy.step()
+        if ended := self._deputy.ended:
+            raise RunFailed(f"{ended[0]} ended before the run did; the last line of its log: {self._deputy.last_words(ended[0])}")
         if foreign := self._bus.foreign:
             raise UserError(f"another stack runs on this bus ({foreign}): end it, or give --port N to keep the two apart.")
-        for warning in self._stack.warnings[self._num_warnings_said:]:
+        for warning in self._deputy.warnings[self._num_warnings_said:]:
             view.say(warning)
-        self._num_warnings_said = len(self._stack.warnings)
+        self._num_warnings_said = len(self._deputy.warnings)
 
     def _check_stall(self) -> None:
         progress = self._bus.progress
@@ -167,7 +175,7 @@ class Launcher:
         undecodable = sum(report.undecodable for report in self._bus.progress.stages.values())
         facts = RunFacts(source=self._source.text or "bus:", sensor=self._arguments.sensor, extractors=self._arguments.extractors,
                          tiles=self._arguments.tiles, wall_s=wall_s, ended=ended, messages_undecodable=undecodable)
-        return summarize(self._folder, facts, self._stack)
+        return summarize(self._folder, facts, self._deputy)
 
     def _print_summary(self, wall_s: float, ended: str) -> None:
         from tessera_cli.summary import in_words

@@ -7,9 +7,9 @@ from pathlib import Path
 from tessera_cli import plot
 from tessera_cli.errors import RunFailed
 from tessera_cli.files import write_text
+from tessera_cli.lan.private_deputy import PrivateDeputy
 from tessera_cli.report import write_report
 from tessera_cli.run_folder import Result, default_alignment, read_run
-from tessera_cli.stack import Stack
 from tessera_cli.versions import collect_versions
 
 # What the evaluator's run.json hands over as it is.
@@ -41,12 +41,12 @@ class ProcessFacts:
     warnings: list[str]
 
 
-def summarize(folder: Path, facts: RunFacts, stack: Stack) -> dict:
+def summarize(folder: Path, facts: RunFacts, deputy: PrivateDeputy) -> dict:
     """As write_summary, of a run of this machine."""
     return write_summary(folder, facts, ProcessFacts(
-        cpu_s={name: process.cpu_s for name, process in stack.processes.items()},
-        max_rss_mb={name: process.max_rss_mb for name, process in stack.processes.items()},
-        num_extractor_restarts=stack.num_extractor_restarts, warnings=stack.warnings))
+        cpu_s={process.name: process.cpu_s for process in deputy.processes},
+        max_rss_mb={process.name: process.max_rss_mb for process in deputy.processes},
+        num_extractor_restarts=deputy.num_restarts("extractor"), warnings=deputy.warnings))
 
 
 def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> dict:

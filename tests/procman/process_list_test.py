@@ -78,7 +78,7 @@ def test_scripts_name_processes(tmp_path):
     ('cmd "a" { exec = "rm -rf /"; }', 1, 11, "name of one command"),
     ('cmd "a" { exec = "rm x"; }', 1, 1, "name one command"),
     ('cmd "a" { environment = "LD_PRELOAD=x"; }', 1, 11, "deputy's own"),
-    ('cmd "a" { count = 0; }', 1, 11, "from 1"),
+    ('cmd "a" { count = -1; }', 1, 11, "from 0"),
     ('cmd "a" { count = 200; host = "a,b"; }', 1, 1, "more than 256"),
     ('cmd "a_1" { }\ncmd "a" { count = 2; }', 2, 1, 'be named "a_1"'),
     ('cmd "a" { depends = "b"; }', 1, 11, 'no cmd or group "b"'),
@@ -135,3 +135,13 @@ def test_faults_of_command_lists_are_named_with_their_place(tmp_path, text, plac
     with pytest.raises(UserError) as caught:
         read_command_list(path)
     assert str(caught.value).startswith(f"{path}:{place}: ") and words in str(caught.value)
+
+
+def test_counts_may_be_said_by_who_reads_the_list(tmp_path):
+    path = write(tmp_path, 'group "g" { cmd "a" { count = 2; } cmd "b" { count = 0; } } cmd "c" { depends = "g"; }'
+                           'script "s" { wait cmd "b" status "ready"; }')
+    assert list(read_process_list(path).processes) == ["a_0", "a_1", "c"], "none of b unless it is asked for"
+    chosen = read_process_list(path, {"a": 1, "b": 1, "c": 2}).processes
+    assert list(chosen) == ["a_0", "b", "c_0", "c_1"] and chosen["c_1"].depends == ("a_0", "b")
+    with pytest.raises(UserError, match='no cmd "d"'):
+        read_process_list(path, {"d": 1})

@@ -89,7 +89,7 @@ OPTIONS: dict[str, Callable] = {
 ATTRIBUTES: dict[str, Callable] = {
     "exec": words(NAME, "the name of one command of the deputy's list"),
     "host": words(HOST, "ids of deputies"),
-    "count": number(1, MAX_INSTANCES, int),
+    "count": number(0, MAX_INSTANCES, int),
     "depends": words(NAME, "names of commands or groups"),
     **OPTIONS,
 }

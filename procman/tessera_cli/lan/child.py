@@ -1,7 +1,8 @@
-"""One running process of a deputy: started with its limits, its output read, its whole tree ended."""
+"""One running process of a deputy: started with its limits, its output read, accounted by the kernel, its whole tree ended."""
 
 import ctypes
 import os
+import re
 import signal
 import subprocess
 from dataclasses import dataclass
@@ -29,8 +30,18 @@ class Launch:
     generation: int  # another one, another process
 
 
+def describe_exit(status: int) -> str:
+    """As `Child.poll` tells it."""
+    if status >= 0:
+        return f"ended with status {status}"
+    try:
+        return f"was killed by {signal.Signals(-status).name}"
+    except ValueError:
+        return f"was killed by signal {-status}"
+
+
 def _prepare(parent: int, options: RunOptions) -> None:
-    """Runs in the child before exec."""
+    """Runs in the child before exec: the kernel kills it when `parent` is gone, however that went."""
     _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
@@ -51,6 +62,9 @@ class Child:
         os.set_blocking(self._popen.stdout.fileno(), False)
         self.pid = self._popen.pid
         self.may_say_more = True  # until it and all its descendants have closed their output
+        self.cpu_s = 0.0          # of itself and of descendants that it waited for; known when it has ended
+        self.max_rss_mb = 0.0     # its own peak, 10^6 bytes
+        self._status: int | None = None
 
     def fileno(self) -> int:
         return self._popen.stdout.fileno()
@@ -66,7 +80,25 @@ class Child:
 
     def poll(self) -> int | None:
         """Exit status, negative: by that signal; None while it runs."""
-        return self._popen.poll()
+        if self._status is None:
+            self._note_peak_memory()
+            self._reap(os.WNOHANG)
+        return self._status
+
+    def _reap(self, options: int) -> None:
+        pid, status, usage = os.wait4(self.pid, options)
+        if pid:
+            self.cpu_s = usage.ru_utime + usage.ru_stime
+            self._status = self._popen.returncode = os.waitstatus_to_exitcode(status)
+
+    def _note_peak_memory(self) -> None:
+        """The kernel's high-water mark since exec. (ru_maxrss would begin with what this Python had when it forked.)"""
+        try:
+            status = Path(f"/proc/{self.pid}/status").read_text()
+        except OSError:
+            return
+        if peak := re.search(r"^VmHWM:\s*(\d+) kB", status, re.MULTILINE):
+            self.max_rss_mb = max(self.max_rss_mb, 1024e-6 * int(peak[1]))
 
     def ask_to_end(self, number: int) -> None:
         """Its whole group, as a terminal would."""
@@ -80,8 +112,11 @@ class Child:
 
     def end(self) -> None:
         """Kills what is left of the tree."""
+        if self._status is None:
+            self._note_peak_memory()
         kill_marked(self._mark)
-        self._popen.wait()
+        if self._status is None:
+            self._reap(0)
 
     def close(self) -> None:
         self._popen.stdout.close()

@@ -24,7 +24,7 @@ PLACEHOLDERS = ("bin", "settings", "name", "id")
 class LocalCommand:
     name: str
     words: tuple[str, ...]  # program and arguments, with placeholders
-    folder: Path = ROOT     # working folder
+    folder: Path            # working folder
     environment: dict[str, str] = field(default_factory=dict)  # added to the deputy's own
 
     def fill(self, values: dict[str, str]) -> list[str]:
@@ -32,11 +32,11 @@ class LocalCommand:
         return [PLACEHOLDER.sub(lambda match: values[match[1]], word) for word in self.words]
 
 
-def read_command_list(path: Path) -> dict[str, LocalCommand]:
-    """Raises UserError with file, line and column of the first fault."""
+def read_command_list(path: Path, folder: Path = ROOT) -> dict[str, LocalCommand]:
+    """`folder`: where commands work for which the list says none. Raises UserError with file, line and column of the first fault."""
     commands: dict[str, LocalCommand] = {}
     for block in read_blocks(path):
-        command = _read_command(block)
+        command = _read_command(block, folder)
         if command.name in commands:
             raise block.place.error(f"there are two commands \"{command.name}\".")
         commands[command.name] = command
@@ -45,7 +45,7 @@ def read_command_list(path: Path) -> dict[str, LocalCommand]:
     return commands
 
 
-def _read_command(block: Block) -> LocalCommand:
+def _read_command(block: Block, folder: Path) -> LocalCommand:
     if block.kind != "cmd":
         raise block.place.error(f"a command list holds only cmd, not '{block.kind}'.")
     for inner in block.blocks + block.steps:
@@ -54,7 +54,7 @@ def _read_command(block: Block) -> LocalCommand:
     if "exec" not in values:
         raise block.place.error(f"cmd \"{block.name}\" has no exec.")
     words = values.pop("exec")
-    return LocalCommand(require_name(block), words, **values)
+    return LocalCommand(require_name(block), words, **{"folder": folder, **values})
 
 
 def _read_words(text: str) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from tessera_cli.lan.child import Child, Launch
 from tessera_cli.lan.log_file import RotatingLog
-from tessera_cli.lan.state_folder import StateFolder
+from tessera_cli.lan.state_folder import LogFolder
 from tessera_cli.lan.supervised import READY, STATE_NAMES, Supervised
 from tessera_cli.lan.tree import Trees
 from tessera_cli.types import procman_process_t
@@ -14,15 +14,18 @@ from tessera_cli.types import procman_process_t
 USAGE_PERIOD_S = 1.0
 # Deputies speak once a second; one that was not heard for longer may be gone, and its processes with it.
 OTHERS_STALE_AFTER_S = 5.0
+# Who takes longer between two looks was stopped itself (Ctrl-Z), or kept from running.
+LONGEST_TURN_S = 1.0
 
 
 class Crew:
-    def __init__(self, folder: StateFolder, on_output: Callable[[str, bytes], None]):
+    def __init__(self, folder: LogFolder, on_output: Callable[[str, bytes], None]):
         self._folder, self._on_output = folder, on_output
         self._members: dict[str, Supervised] = {}
         self._others: dict[str, tuple[int, float]] = {}  # (state, when heard)
         self._trees = Trees()
         self._usage_at = 0.0
+        self._stepped_at: float | None = None
         self._told: dict[str, str] = {}
 
     @property
@@ -77,10 +80,10 @@ class Crew:
     def tail(self, name: str, num_lines: int) -> str:
         return self._members[name].log.tail(num_lines)
 
-    def on_stage_status(self, name: str, pid: int, is_finished: bool, now: float) -> None:
+    def on_stage_status(self, name: str, pid: int, is_finished: bool, heard_at: float) -> None:
         member = self._members.get(name)
         if member and member.child and pid in {member.child.pid, *member.usage.pids}:
-            member.on_stage_status(is_finished, now)
+            member.on_stage_status(is_finished, heard_at)
 
     def hear_of_others(self, states: dict[str, int], now: float) -> None:
         """States of another deputy's processes by name."""
@@ -93,15 +96,23 @@ class Crew:
         self._others = {name: heard for name, heard in self._others.items() if not name.startswith(of)}
 
     def step(self, now: float) -> None:
+        """`now`: monotonic seconds, as everywhere here."""
+        if self._stepped_at is not None and now - self._stepped_at > LONGEST_TURN_S:
+            for member in self._members.values():
+                member.excuse(now - self._stepped_at, now)
+        self._stepped_at = now
         if now - self._usage_at >= USAGE_PERIOD_S:
             self._usage_at = now
             self._measure(now)
-        needed = {name for member in self._members.values() if member.child for name in member.depends}
+        # What has done its last work needs nobody any more.
+        needed = {name for member in self._members.values() if member.child and member.state != procman_process_t.FINISHED
+                  for name in member.depends}
         for member in self._members.values():
             member.step(now, self._is_not_ready, member.name in needed)
 
     def _measure(self, now: float) -> None:
-        usages = self._trees.snapshot([member.child.pid for member in self._members.values() if member.child], now)
+        roots = [member.child.pid for member in self._members.values() if member.child]
+        usages = self._trees.snapshot(roots, now) if roots else {}
         for member in self._members.values():
             if member.child and member.child.pid in usages:
                 member.usage = usages[member.child.pid]

@@ -6,8 +6,6 @@ anew. Several lists run beside each other, each with settings, a bus and orders 
 
 import os
 import select
-import subprocess
-import sys
 import time
 from argparse import Namespace
 from pathlib import Path
@@ -19,6 +17,7 @@ from tessera_cli.interrupt import Interrupt
 from tessera_cli.lan.attributes import HOST
 from tessera_cli.lan.command_list import read_command_list
 from tessera_cli.lan.crew import Crew
+from tessera_cli.lan.guard import Guard
 from tessera_cli.lan.keys import KeyRing, key_folder
 from tessera_cli.lan.names import LIST, qualify, split
 from tessera_cli.lan.orders import Gate
@@ -27,7 +26,6 @@ from tessera_cli.lan.procman_bus import ORDER, STATUS, Bus, procman_url
 from tessera_cli.lan.report import make_status
 from tessera_cli.lan.running_list import RunningList, listen_to
 from tessera_cli.lan.state_folder import StateFolder
-from tessera_cli.lan.tree import kill_marked
 from tessera_cli.lan.wishes import run_of, to_launch
 from tessera_cli.progress import FINISHED
 from tessera_cli.types import procman_order_t, procman_status_t, stage_status_t
@@ -70,27 +68,19 @@ class Deputy:
         self._bus.subscribe(STATUS, procman_status_t, self._on_deputy)
         self._look_for_twins()
         self._bus.subscribe(ORDER, None, self._on_order)
-        if not kill_marked(f"{self._folder.path}/"):
-            raise RunFailed("processes of an earlier deputy of this folder can't be ended.")
-        guard = self._start_guard()
+        guard = Guard(self._folder.mark())
         self._say(f"deputy {self._id} on {self._bus.url}; logs in {self._folder.path / 'logs'}")
         if self._resumes:
             self._resume()
         while not interrupt.requested:
             self._turn()
-            if guard.poll() is not None:
-                guard = self._start_guard()
+            guard.watch()
         self._say("ending all processes")
         self._crew.want({}, "")
         while not self._crew.is_idle:
             self._turn()
         self._publish_status()
-        guard.stdin.close()
-        return guard.wait()
-
-    def _start_guard(self) -> subprocess.Popen:
-        return subprocess.Popen([sys.executable, "-m", "tessera_cli.lan.guard", str(self._folder.path)], stdin=subprocess.PIPE,
-                                start_new_session=True, env={**os.environ, "PYTHONPATH": str(ROOT / "procman")})
+        return guard.end()
 
     def _say(self, sentence: str) -> None:
         print(f"tessera: {sentence}", flush=True)

@@ -29,7 +29,7 @@ class Process:
 
 @dataclass(frozen=True)
 class ScriptStep:
-    """start, stop, restart: `names`. wait: until `names` are `status`, at most `seconds`; without names: sleep. run_script: `script`."""
+    """start, stop, restart: `names`. wait: until `names` are `status`, at most `seconds`; without a status: sleep. run_script: `script`."""
 
     action: str
     place: Place
@@ -57,13 +57,15 @@ def require_name(block: Block) -> str:
     return block.name
 
 
-def read_process_list(path: Path) -> ProcessList:
-    """Raises UserError with file, line and column of the first fault."""
-    return _Reader(path).read(read_blocks(path))
+def read_process_list(path: Path, counts: dict[str, int] | None = None) -> ProcessList:
+    """`counts`: of processes on each host, by cmd, instead of what the list says. Raises UserError with file, line and column
+    of the first fault."""
+    return _Reader(path, counts or {}).read(read_blocks(path))
 
 
 class _Reader:
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, counts: dict[str, int]):
+        self._counts = counts
         self._list = ProcessList(path)
         self._members: dict[str, list[str]] = {}       # processes of each cmd and group
         self._depends: list[tuple[str, Attribute]] = []  # of a cmd, to be resolved when all names are known
@@ -74,6 +76,8 @@ class _Reader:
                 self._read_settings(block)
             elif block.kind != "script":
                 self._read_member(block)
+        if strangers := sorted(set(self._counts) - {block.name for block in _commands(blocks)}):
+            raise UserError(f"{self._list.path} has no cmd \"{strangers[0]}\".")
         if not self._list.processes:
             raise UserError(f"{self._list.path} lists no process: it needs a block cmd \"NAME\" {{ ... }}.")
         self._resolve_depends()
@@ -113,13 +117,14 @@ class _Reader:
         for inner in block.blocks:
             raise inner.place.error("a cmd holds no blocks.")
         values = read_attributes(block, ATTRIBUTES)
-        hosts, count = values.pop("host", ("",)), values.pop("count", 1)
+        hosts, listed_count = values.pop("host", ("",)), values.pop("count", None)
+        count = self._counts.get(block.name, 1 if listed_count is None else listed_count)
         commands = values.pop("exec", (block.name,))
         if len(commands) != 1:
             raise block.place.error("exec must name one command of the deputy's list.")
         values.pop("depends", None)
         self._depends += [(block.name, attribute) for attribute in block.attributes if attribute.name == "depends"]
-        is_numbered = any(attribute.name == "count" for attribute in block.attributes) or len(hosts) > 1
+        is_numbered = bool(listed_count) or count > 1 or len(hosts) > 1
         if len(hosts) * count > MAX_INSTANCES:
             raise block.place.error(f"{len(hosts)} hosts with {count} each are more than {MAX_INSTANCES} processes.")
         names = []
@@ -191,6 +196,11 @@ class _Reader:
         for name, steps in self._list.scripts.items():
             if steps and (circle := _find_circle(name, calls)):
                 raise steps[0].place.error(f"script {' runs '.join(circle)}, without end.")
+
+
+def _commands(blocks: list[Block]) -> list[Block]:
+    """Also those in groups."""
+    return [block for block in blocks if block.kind == "cmd"] + [inner for block in blocks for inner in _commands(block.blocks)]
 
 
 def _read_seconds(text: str, place: Place) -> float:

@@ -46,7 +46,7 @@ class ScriptRunner:
                     self.stop(step.names)
                 case "restart":
                     self._restart(step.names)
-                case "wait" if not step.names:
+                case "wait" if not step.status:
                     self._sheriff.listen(step.seconds)
                 case "wait":
                     self._wait_of(step)

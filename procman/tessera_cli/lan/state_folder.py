@@ -1,33 +1,46 @@
-"""A deputy's folder: its lock, the last order of each list that it obeyed, the settings of its processes, and their logs."""
+"""A deputy's folder: the logs of its processes; on a node also the last order of each list that it obeyed, and their settings."""
 
 import fcntl
+import os
 from pathlib import Path
 
 from tessera_cli.errors import UserError
 from tessera_cli.files import replacing
 
 
-class StateFolder:
-    def __init__(self, path: Path, deputy: str):
+class LogFolder:
+    """One deputy at a time has it. Its processes carry the folder's path in their mark (tree.py), so that each can be found."""
+
+    def __init__(self, path: Path, taken: str):
+        """Makes the folder. `taken`: the sentence if another deputy has it."""
         self.path = path
         try:
-            (path / "logs").mkdir(parents=True, exist_ok=True)
-            (path / "orders").mkdir(exist_ok=True)
-            self._lock = open(path / "lock", "w")
+            self.log_path("any").parent.mkdir(parents=True, exist_ok=True)
+            self._lock = os.open(path, os.O_RDONLY)  # never closed: the lock goes with this process
         except OSError as error:
-            raise UserError(f"the deputy's folder {path} can't be used: {error.strerror}.") from error
+            raise UserError(f"the folder {path} can't be used: {error.strerror}.") from error
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise UserError(f"a deputy with the id {deputy} and this port runs on this machine already: give --id NAME or --port N.") from error
+            raise UserError(taken) from error
 
     def log_path(self, process: str) -> Path:
-        path = self.path / "logs" / f"{process}.log"
-        path.parent.mkdir(exist_ok=True)  # that of its list
-        return path
+        return self.path / f"{process}.log"
 
-    def mark(self, process: str) -> str:
+    def mark(self, process: str = "") -> str:
+        """Without `process`: what all marks begin with."""
         return f"{self.path}/{process}"
+
+
+class StateFolder(LogFolder):
+    """Of a node's deputy."""
+
+    def __init__(self, path: Path, deputy: str):
+        super().__init__(path, f"a deputy with the id {deputy} and this port runs on this machine already: give --id NAME or --port N.")
+        (path / "orders").mkdir(exist_ok=True)
+
+    def log_path(self, process: str) -> Path:
+        return self.path / "logs" / f"{process}.log"
 
     def settings_path(self, run: str) -> Path:
         return self.path / f"settings-{run}.yaml"

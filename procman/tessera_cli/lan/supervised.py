@@ -10,12 +10,11 @@
 
 import subprocess
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from tessera_cli.lan.child import Child, Launch
+from tessera_cli.lan.child import Child, Launch, describe_exit
 from tessera_cli.lan.log_file import RotatingLog
 from tessera_cli.lan.tree import Usage
-from tessera_cli.processes import describe_exit
 from tessera_cli.types import procman_process_t as states
 
 # A start after a death waits this long, twice as long each time in a row.
@@ -26,11 +25,18 @@ STABLE_AFTER_S = 10.0
 # One that dies so often in a row has a fault that starting it again does not mend; auto_respawn = "always" tries for ever.
 MAX_DEATHS_IN_A_ROW = 6
 # Of its output, what is kept to be quoted as its last words.
-MAX_LINE = 500
+MAX_LINE = 4000
 STATE_NAMES = {getattr(states, name): name.lower().replace("_", " ")
                for name in ("WAITING", "STARTING", "READY", "FINISHED", "BACKING_OFF", "STOPPING", "STOPPED", "ENDED", "FAILED")}
 UP = (states.STARTING, states.READY, states.FINISHED)
 READY = (states.READY, states.FINISHED)
+
+
+@dataclass(frozen=True)
+class Death:
+    status: int      # exit status; negative: by that signal
+    how: str         # goes on after its name: "was killed by SIGKILL", "was not ready within 30 s"
+    last_words: str  # the last line of its output
 
 
 @dataclass
@@ -46,6 +52,10 @@ class Supervised:
     num_starts: int = 0
     started_at: float = 0.0
     usage: Usage = field(default_factory=Usage)
+    cpu_s: float = 0.0       # of the lives that are over, as the kernel accounts them
+    max_rss_mb: float = 0.0  # the highest peak of them
+    num_deaths: int = 0      # ends that nobody had asked for
+    last_death: Death | None = None  # of the last life, however it ended; None: it lives, or can't be started
     child: Child | None = None
     _running: Launch | None = None
     _heard_at: float = 0.0
@@ -72,11 +82,19 @@ class Supervised:
         launch = self._running or self.wanted
         return launch.depends if launch else ()
 
-    def on_stage_status(self, is_finished: bool, now: float) -> None:
-        """Its stage says that it runs."""
-        self._heard_at = now
+    @property
+    def last_words(self) -> str:
+        return self._last_line.decode(errors="replace").strip() or "(it said nothing)"
+
+    def on_stage_status(self, is_finished: bool, heard_at: float) -> None:
+        """Its stage said that it runs."""
+        self._heard_at = max(self._heard_at, heard_at)
         if self.state in UP:
             self.state = states.FINISHED if is_finished else states.READY
+
+    def excuse(self, pause_s: float, now: float) -> None:
+        """The deputy itself stood still, and heard nobody meanwhile."""
+        self._heard_at = min(now, self._heard_at + pause_s)
 
     def step(self, now: float, not_ready: Callable[[str], bool], has_dependents: bool) -> None:
         """`not_ready` of another process; `has_dependents`: some that need this one still run, so it must not end yet."""
@@ -103,7 +121,7 @@ class Supervised:
         self._start(now)
 
     def _start(self, now: float) -> None:
-        self._running, self._fate, self._kill_at, self._last_line = self.wanted, "", None, b""
+        self._running, self._fate, self._kill_at, self._last_line, self.last_death = self.wanted, "", None, b"", None
         if self.state == states.WAITING:
             self.reason = ""  # after a death it says on what account it was started again
         try:
@@ -118,7 +136,7 @@ class Supervised:
 
     def _watch(self, now: float) -> None:
         options = self._running.options
-        if self.state == states.STARTING and now - self.started_at > options.ready_timeout_s:
+        if self.state == states.STARTING and now - self._heard_at > options.ready_timeout_s:
             self._kill(f"was not ready within {options.ready_timeout_s:g} s")
         elif self.state in READY and options.ready == "status" and 0 < options.hang_timeout_s < now - self._heard_at:
             self._kill(f"said nothing for {options.hang_timeout_s:g} s")
@@ -153,19 +171,21 @@ class Supervised:
         self._read()
         self.child.close()
         lived_s, was_stopped = now - self.started_at, self._kill_at is not None
+        self.cpu_s, self.max_rss_mb = self.cpu_s + self.child.cpu_s, max(self.max_rss_mb, self.child.max_rss_mb)
+        self.last_death = Death(status, self._fate or describe_exit(status), self.last_words)
         launch, self.child, self._running, self.usage = self._running, None, None, Usage()
         if was_stopped or self.wanted != launch:
             self.state = states.WAITING if self.wanted else states.STOPPED
             return
-        self.reason = self._fate or describe_exit(status)
-        if status > 0 and not self._fate:
-            self.reason += f": {self._last_line.decode(errors='replace').strip() or '(it said nothing)'}"
+        self.num_deaths += 1
         self._deaths = 1 if lived_s > STABLE_AFTER_S else self._deaths + 1
-        if not self._is_worth_another_try(status):
-            self.state = states.ENDED if status == 0 and not self._fate else states.FAILED
-        else:
+        if self._is_worth_another_try(status):
             self.state = states.BACKING_OFF
             self._due_at = now + min(LONGEST_BACK_OFF_S, FIRST_BACK_OFF_S * 2 ** min(self._deaths - 1, 10))
+        else:
+            self.state = states.ENDED if status == 0 and not self._fate else states.FAILED
+        says_why = status > 0 and not self._fate
+        self.reason = self.last_death.how + (f": {self.last_death.last_words}" if says_why else "")
 
     def _is_worth_another_try(self, status: int) -> bool:
         mode = self.wanted.options.auto_respawn
@@ -173,7 +193,8 @@ class Supervised:
         if mode == "always":
             return was_killed or status != 2
         if self._deaths > MAX_DEATHS_IN_A_ROW:
-            self.reason += f"; it died {self._deaths} times in a row"
+            how = f"died {self._deaths} times in a row, the last time it {self.last_death.how}"
+            self.last_death = replace(self.last_death, how=how)
             return False
         return (mode == "failure" and (was_killed or status not in (0, 2))) or (mode == "killed" and was_killed)
 

@@ -10,15 +10,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import psutil
-
 MARK = "TESSERA_PROCESS"  # its value: <deputy's folder>/<process>
 KILL_TIMEOUT_S = 5.0
 
 
 def marked(value: str) -> list[int]:
     """Processes with this mark; a value that ends in "/" stands for all that begin with it."""
-    start = f"\0{MARK}={value}".encode() + (b"" if value.endswith("/") else b"\0")
+    start = os.fsencode(f"\0{MARK}={value}") + (b"" if value.endswith("/") else b"\0")
     found = []
     for name in os.listdir("/proc"):
         if name.isdecimal() and int(name) != os.getpid():
@@ -65,6 +63,8 @@ class Trees:
 
     def snapshot(self, roots: list[int], now: float) -> dict[int, Usage]:
         """`now`: monotonic seconds."""
+        import psutil  # late: the guard does without it, and a run starts its processes first
+
         children: dict[int, list[int]] = {}
         for process in psutil.process_iter(["ppid"]):
             children.setdefault(process.info["ppid"], []).append(process.pid)
@@ -73,6 +73,8 @@ class Trees:
         return {root: self._usage(root, children, before, elapsed_s) for root in roots}
 
     def _usage(self, root: int, children: dict[int, list[int]], before: dict[int, float], elapsed_s: float) -> Usage:
+        import psutil
+
         pids, rss_bytes, cpu_s, total_cpu_s = [root], 0, 0.0, 0.0
         for pid in pids:
             pids += children.get(pid, [])
