@@ -36,6 +36,9 @@ class FrameSource {
   virtual const std::vector<GroundTruthPose>& ground_truth() const = 0;
   // The next frame; nullopt at the end. Throws InputError at an image that is damaged or of another size.
   virtual std::optional<CameraFrame> Next() = 0;
+  // Frames below this number are not needed any more. A source that has to read them on its way to the others yields them
+  // all the same.
+  virtual void SkipTo(FrameId /*frame*/) {}
   // Whether frames come by themselves and can't be made to wait.
   virtual bool is_live() const = 0;
   // What the user should know of how the source was read, one sentence each.

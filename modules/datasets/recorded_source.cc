@@ -17,6 +17,7 @@ class RecordedSource : public FrameSource {
   std::optional<int64_t> num_frames() const override { return end_ - first_; }
   const std::vector<GroundTruthPose>& ground_truth() const override { return ground_truth_; }
   std::optional<CameraFrame> Next() override;
+  void SkipTo(FrameId frame) override { next_ = std::clamp(frame.value, next_, end_); }
   bool is_live() const override { return false; }
   const std::vector<std::string>& notes() const override { return recording_.notes; }
 

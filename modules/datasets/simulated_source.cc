@@ -32,6 +32,7 @@ class SimulatedSource : public FrameSource {
     ++next_.value;
     return frame;
   }
+  void SkipTo(FrameId frame) override { next_.value = std::clamp(frame.value, next_.value, end_); }
   bool is_live() const override { return false; }
   const std::vector<std::string>& notes() const override { return notes_; }
 

@@ -23,7 +23,7 @@ StreamReceiver* ChannelReceiver::Find(const std::string& publisher, int64_t epoc
     return nullptr;
   }
   if (it != streams_.end()) {
-    it->second.receiver->Abandon();
+    if (!options_.discards_at_restart) it->second.receiver->Abandon();
     past_counts_.num_repaired += it->second.receiver->counts().num_repaired;
     past_counts_.num_lost += it->second.receiver->counts().num_lost;
     sink_.lose(publisher, 0);

@@ -34,6 +34,7 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   } else {
     StreamReceiverOptions options = settings_.receiver;
     options.starts_now = delivery == Delivery::kFromNow;
+    options.discards_at_restart = true;  // a frame behind one that lacks would be taken for the next
     subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
   }
   bus->Subscribe(this, settings_.channel_prefix + channel.name,

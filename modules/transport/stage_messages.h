@@ -17,7 +17,8 @@ struct ExtractorReady {
   int64_t num_jobs_done = 0;  // since it started
 };
 
-// The reassembler has the candidates of these tiles of one frame: nobody needs to work on them again.
+// The reassembler has the candidates of these tiles of one frame: nobody needs to work on them again, as long as this
+// reassembler lives. Its first one names no tiles: it has nothing of what was sent before.
 struct TileAck {
   FrameId frame;
   std::vector<int32_t> tiles;

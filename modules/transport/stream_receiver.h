@@ -26,6 +26,8 @@ struct StreamReceiverOptions {
   int max_asked = 32;                    // messages asked for at a time, so that the answer fits the receive buffer
   size_t max_waiting_bytes = size_t{1} << 26;  // kept behind a gap; what comes beyond is dropped and asked for again
   bool starts_now = false;               // begin with what is sent from now on, not with what the publisher still has
+  // What waits behind a gap when the publisher is started again is not given on: its successor sends it again.
+  bool discards_at_restart = false;
 };
 
 struct StreamCounts {

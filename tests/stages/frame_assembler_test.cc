@@ -61,6 +61,22 @@ TEST(FrameAssembler, ReleasesFramesInOrderWhateverTheOrderOfTiles) {
   }
 }
 
+TEST(FrameAssembler, OneThatIsStartedAgainGoesOnBehindWhatIsTracked) {
+  FrameAssembler assembler(64);
+  for (const TileFeatures& tile : TilesOf(8, 7)) assembler.Add(tile);
+  for (const TileFeatures& tile : TilesOf(9, 8)) assembler.Add(tile);
+  EXPECT_FALSE(assembler.CanRelease()) << "frame 7 may still lack";
+  assembler.SkipTo({7});
+  ASSERT_TRUE(assembler.CanRelease());
+  EXPECT_EQ(assembler.ReleaseNext().frame.value, 8);
+  assembler.SkipTo({8});
+  EXPECT_EQ(assembler.num_open_frames(), 1);
+  assembler.SkipTo({9});
+  EXPECT_EQ(assembler.num_open_frames(), 0);
+  EXPECT_EQ(assembler.Add(TilesOf(9, 8).front()), FrameAssembler::Result::kRepeated);
+  EXPECT_EQ(assembler.last_released().value, 9);
+}
+
 TEST(FrameAssembler, RefusesContradictionsAndFloods) {
   const std::vector<TileFeatures> tiles = TilesOf(0, -1);
   FrameAssembler assembler(2);

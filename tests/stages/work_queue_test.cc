@@ -141,6 +141,45 @@ TEST(WorkQueue, BoundsFramesInFlightAndDropsWhenFull) {
   EXPECT_EQ(last[1].previous.value, 4) << "dropped frames are not waited for";
 }
 
+TEST(WorkQueue, GivesAllOfWhatIsNotTrackedAgainToANewReassembler) {
+  WorkQueueOptions options;
+  options.jobs_per_extractor = 10;
+  WorkQueue queue(options);
+  queue.HearExtractor(0, 1, 0);
+  for (int64_t id = 0; id < 3; ++id) ASSERT_TRUE(queue.AddFrame(Frame(id), kCalibration, 0));
+  std::vector<Given> first = GiveAll(queue, 0);
+  ASSERT_EQ(first.size(), 3U);
+  for (const int64_t id : {0, 1}) queue.Acknowledge({id}, {0});
+  queue.MarkTracked({0});
+  EXPECT_FALSE(queue.CanGive());
+  queue.GiveAllAgain();
+  const std::vector<Given> second = GiveAll(queue, 0);
+  ASSERT_EQ(second.size(), 2U);
+  EXPECT_EQ(second[0].frame.value, 1);
+  EXPECT_EQ(second[0].previous.value, 0);
+  EXPECT_EQ(second[1].frame.value, 2);
+  queue.Acknowledge({1}, {0});
+  EXPECT_FALSE(queue.idle());
+  queue.MarkTracked({2});  // what its first reassembler released is done
+  EXPECT_TRUE(queue.idle());
+}
+
+TEST(WorkQueue, ANewQueueGoesOnBehindWhatIsTracked) {
+  WorkQueueOptions options;
+  options.max_queued_frames = 2;
+  WorkQueue queue(options);
+  for (int64_t id = 0; id < 6; ++id) EXPECT_TRUE(queue.AddFrame(Frame(id), kCalibration, 0, true));
+  EXPECT_FALSE(queue.AddFrame(Frame(6), kCalibration, 0));
+  queue.MarkTracked({5});
+  EXPECT_TRUE(queue.idle());
+  queue.SkipFrame({6});
+  ASSERT_TRUE(queue.AddFrame(Frame(7), kCalibration, 0));
+  queue.HearExtractor(0, 1, 0);
+  const std::vector<Given> given = GiveAll(queue, 0);
+  ASSERT_EQ(given.size(), 1U);
+  EXPECT_EQ(given[0].previous.value, 6);
+}
+
 // Extractors that die, restart, answer late or never: all the work gets done in the end.
 TEST(WorkQueue, FinishesWhateverHappensToExtractors) {
   for (unsigned seed = 0; seed < 20; ++seed) {

@@ -35,6 +35,19 @@ TEST(Channel, ARestartedPublisherBeginsANewStream) {
   EXPECT_EQ(channel.counts().num_lost, 1);
 }
 
+TEST(Channel, WhatWaitsBehindAGapCanBeLeftToTheSuccessor) {
+  std::vector<std::pair<int64_t, int64_t>> delivered;  // epoch, number
+  ChannelReceiver channel("FEATURES", {.discards_at_restart = true},
+                          {.deliver = [&](ByteView, const MessageHeader& header,
+                                          int64_t) { delivered.emplace_back(header.epoch_us, header.sequence); },
+                           .lose = [](const std::string&, int64_t num_messages) { EXPECT_EQ(num_messages, 0); }});
+  for (const auto& [epoch_us, sequence] : {std::pair(100, 0), std::pair(100, 2), std::pair(200, 0)}) {
+    channel.OnMessage({.publisher = "reassembler", .epoch_us = epoch_us, .sequence = sequence}, kMessage, 0, 0);
+  }
+  EXPECT_EQ(delivered, (std::vector<std::pair<int64_t, int64_t>>{{100, 0}, {200, 0}}));
+  EXPECT_EQ(channel.counts().num_lost, 0);
+}
+
 TEST(Channel, PublishersDoNotWaitForEachOther) {
   std::vector<std::string> delivered;
   ChannelReceiver channel("TILE_FEATURES", {},

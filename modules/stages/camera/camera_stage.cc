@@ -1,5 +1,6 @@
 #include "stages/camera/camera_stage.h"
 
+#include <algorithm>
 #include <exception>
 
 #include "core/errors.h"
@@ -48,12 +49,18 @@ PacerOptions PacerOptionsFrom(const Settings& settings, bool is_live) {
   return options;
 }
 
+// Frames that the dispatcher can have taken, beyond the last one tracked.
+int64_t NumOnTheWay(const Settings& settings) {
+  return settings.Get<int>("dispatcher.max_queued_frames") + settings.Get<int>("dispatcher.max_frames_in_flight");
+}
+
 }  // namespace
 
 CameraStage::CameraStage(StageContext& context)
     : context_(context),
       source_(Open(context.settings())),
-      pacer_(PacerOptionsFrom(context.settings(), source_->is_live())) {
+      pacer_(PacerOptionsFrom(context.settings(), source_->is_live())),
+      renumbering_(NumOnTheWay(context.settings())) {
   for (const std::string& note : source_->notes()) {
     context.Info(note);
   }
@@ -62,6 +69,10 @@ CameraStage::CameraStage(StageContext& context)
   frames_ = context.Advertise<CameraFrame>(kCameraChannel);
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
   context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+    if (pose.frame > tracked_) {
+      tracked_ = pose.frame;
+      tracked_utime_us_ = pose.utime_us;
+    }
     pacer_.MarkTracked(pose.frame);
     last_progress_us_ = context_.now_us();
   });
@@ -90,6 +101,7 @@ bool CameraStage::Step() {
     if (!next_) {
       ReadNext();
     }
+    SkipTracked();
   } catch (const InputError& error) {
     has_ended_ = true;  // broken off: no END_OF_STREAM
     context_.Fail(error.what(), 2);
@@ -110,6 +122,19 @@ bool CameraStage::Step() {
 void CameraStage::ReadNext() {
   const StepTimer timer(context_);
   next_ = source_->Next();
+  if (next_) renumbering_.Apply(*next_);
+}
+
+// A camera that was started again goes on behind what is tracked; what is on its way is sent once more.
+void CameraStage::SkipTracked() {
+  if (!next_ || next_->id > tracked_) return;
+  if (source_->is_live()) {
+    renumbering_.MoveBehind(tracked_, tracked_utime_us_, *next_);
+    return;
+  }
+  source_->SkipTo({tracked_.value + 1});
+  while (next_ && next_->id <= tracked_) ReadNext();
+  pacer_.RestartClock();
 }
 
 void CameraStage::SendNext() {
@@ -136,6 +161,7 @@ void CameraStage::End() {
     return;
   }
   has_ended_ = true;
+  last_sent_ = std::max(last_sent_, tracked_);
   SendGroundTruthUpTo(last_sent_);
   end_of_stream_.Publish({.stage = "camera", .num_frames = last_sent_.value + 1, .num_dropped = 0});
 }

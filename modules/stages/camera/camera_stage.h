@@ -8,6 +8,7 @@
 
 #include "datasets/frame_source.h"
 #include "stages/camera/pacer.h"
+#include "stages/camera/renumbering.h"
 #include "transport/stage.h"
 
 namespace tessera {
@@ -24,6 +25,7 @@ class CameraStage {
  private:
   bool Step();
   void ReadNext();
+  void SkipTracked();
   void SendNext();
   void SendGroundTruthUpTo(FrameId frame);
   void End();
@@ -32,6 +34,7 @@ class CameraStage {
   StageContext& context_;
   std::unique_ptr<FrameSource> source_;
   Pacer pacer_;
+  Renumbering renumbering_;  // of a live source
   Publisher<CameraCalibration> calibration_;
   Publisher<GroundTruthPose> ground_truth_;
   Publisher<CameraFrame> frames_;
@@ -40,6 +43,8 @@ class CameraStage {
   size_t num_truths_sent_ = 0;
   int64_t num_sent_ = 0;
   FrameId last_sent_;
+  FrameId tracked_;  // this frame, and all before it, have a pose
+  int64_t tracked_utime_us_ = 0;
   int64_t last_progress_us_ = 0;  // when a frame was last sent or a pose last came
   bool has_ended_ = false;
   bool warned_ = false;

@@ -33,6 +33,8 @@ class Pacer {
   void MarkSent(FrameId frame);
   // This frame, and all before it, have a pose.
   void MarkTracked(FrameId frame);
+  // Frames are left out: the next one asked about starts kTimed's clock anew.
+  void RestartClock() { start_.reset(); }
 
   // Frames sent and not yet tracked; only kLockstep counts them.
   int num_ahead() const { return static_cast<int>(ahead_.size()); }

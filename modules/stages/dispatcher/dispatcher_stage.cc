@@ -1,6 +1,7 @@
 #include "stages/dispatcher/dispatcher_stage.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/errors.h"
 #include "map/tracking_types.h"
@@ -46,14 +47,9 @@ DispatcherStage::DispatcherStage(StageContext& context)
     queue_.HearExtractor(ready.extractor, ready.epoch_us, context_.now_us());
     GiveWork();
   });
-  context.Subscribe<TileAck>(kTileAckChannel, [this](const TileAck& ack, const MessageInfo&) {
-    queue_.Acknowledge(ack.frame, ack.tiles);
-    GiveWork();
-  });
-  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
-    queue_.MarkTracked(pose.frame);
-    GiveWork();
-  });
+  context.Subscribe<TileAck>(kTileAckChannel,
+                             [this](const TileAck& ack, const MessageInfo& info) { OnAck(ack, info); });
+  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) { OnPose(pose.frame); });
   context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
     if (end.stage == "camera" && !source_end_) {
       source_end_ = end;
@@ -73,8 +69,8 @@ void DispatcherStage::OnCalibration(const CameraCalibration& calibration) {
     return;
   }
   calibration_ = calibration;
-  for (const auto& [frame, arrival_us] : before_calibration_) {
-    QueueFrame(frame, arrival_us);
+  for (Arrived& arrived : before_calibration_) {
+    QueueFrame(std::move(arrived));
   }
   before_calibration_.clear();
   GiveWork();
@@ -82,31 +78,67 @@ void DispatcherStage::OnCalibration(const CameraCalibration& calibration) {
 
 void DispatcherStage::OnFrame(const CameraFrame& frame, const MessageInfo& info) {
   last_activity_us_ = context_.now_us();
+  if (!first_camera_epoch_us_) first_camera_epoch_us_ = info.epoch_us;
   if (frame.id <= newest_) {
-    context_.ReportError("frame " + std::to_string(frame.id.value) + " came after frame " +
+    // A camera that was started again repeats what is not tracked yet.
+    if (info.epoch_us == *first_camera_epoch_us_) context_.ReportError("frame " + std::to_string(frame.id.value) + " came after frame " +
                          std::to_string(newest_.value) + " and is ignored: is there a second camera?");
     return;
   }
-  if (newest_.valid() && frame.id.value > newest_.value + 1) {
-    // Lost on the way from the camera, and nobody could repair it.
-    num_dropped_ += frame.id.value - newest_.value - 1;
-    context_.AddDropped(frame.id.value - newest_.value - 1);
-  }
+  NoteGapBefore(frame.id);
   newest_ = frame.id;
+  // A dispatcher that was started again hears all that the camera still has, before it knows what of that is tracked.
+  Arrived arrived{frame, info.arrival_us, info.publish_us < context_.epoch_us()};
   if (!calibration_) {
-    if (before_calibration_.size() < kMaxFramesBeforeCalibration) {
-      before_calibration_.emplace_back(frame, info.arrival_us);
+    if (arrived.is_late || before_calibration_.size() < kMaxFramesBeforeCalibration) {
+      before_calibration_.push_back(std::move(arrived));
     } else {
       ++num_dropped_;
       context_.AddDropped(1);
     }
     return;
   }
-  QueueFrame(frame, info.arrival_us);
+  QueueFrame(std::move(arrived));
   GiveWork();
 }
 
-void DispatcherStage::QueueFrame(const CameraFrame& frame, int64_t arrival_us) {
+// Frames that got lost on the way from the camera, and that nobody could repair.
+void DispatcherStage::NoteGapBefore(FrameId frame) {
+  const FrameId known = std::max(newest_, tracked_);
+  if (!newest_.valid() || frame.value <= known.value + 1) return;
+  gap_begin_ = {known.value + 1};
+  gap_end_ = frame;
+  num_dropped_ += gap_end_.value - gap_begin_.value;
+  context_.AddDropped(gap_end_.value - gap_begin_.value);
+}
+
+void DispatcherStage::OnPose(FrameId frame) {
+  // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it out.
+  if (frame > tracked_ && frame >= gap_begin_ && frame < gap_end_) {
+    --num_dropped_;
+    context_.AddDropped(-1);
+  }
+  tracked_ = std::max(tracked_, frame);
+  queue_.MarkTracked(frame);
+  GiveWork();
+}
+
+// What a reassembler has is lost with it: its successor begins with nothing.
+void DispatcherStage::OnAck(const TileAck& ack, const MessageInfo& info) {
+  if (reassembler_epoch_us_ && *reassembler_epoch_us_ != info.epoch_us) {
+    queue_.GiveAllAgain();
+  }
+  reassembler_epoch_us_ = info.epoch_us;
+  queue_.Acknowledge(ack.frame, ack.tiles);
+  GiveWork();
+}
+
+void DispatcherStage::QueueFrame(Arrived arrived) {
+  const CameraFrame& frame = arrived.frame;
+  if (frame.id <= tracked_) {
+    queue_.SkipFrame(frame.id);
+    return;
+  }
   if (frame.left.width != calibration_->width_px || frame.left.height != calibration_->height_px ||
       frame.sensor != calibration_->sensor) {
     ++num_dropped_;
@@ -117,10 +149,11 @@ void DispatcherStage::QueueFrame(const CameraFrame& frame, int64_t arrival_us) {
                          ": the frame is dropped");
     return;
   }
-  if (!queue_.AddFrame(frame, *calibration_, arrival_us)) {
+  const FrameId id = frame.id;
+  if (!queue_.AddFrame(std::move(arrived.frame), *calibration_, arrived.arrival_us, arrived.is_late)) {
     ++num_dropped_;
     context_.AddDropped(1);
-    context_.ReportError("the pipeline is slower than the source: frame " + std::to_string(frame.id.value) +
+    context_.ReportError("the pipeline is slower than the source: frame " + std::to_string(id.value) +
                          " is dropped (more extractors, fewer features or a slower pace help)");
   }
 }

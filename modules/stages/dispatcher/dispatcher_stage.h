@@ -18,7 +18,16 @@ class DispatcherStage {
  private:
   void OnFrame(const CameraFrame& frame, const MessageInfo& info);
   void OnCalibration(const CameraCalibration& calibration);
-  void QueueFrame(const CameraFrame& frame, int64_t arrival_us);
+  void OnPose(FrameId frame);
+  void NoteGapBefore(FrameId frame);
+  void OnAck(const TileAck& ack, const MessageInfo& info);
+  // A frame that came, until it is queued.
+  struct Arrived {
+    CameraFrame frame;
+    int64_t arrival_us = 0;
+    bool is_late = false;  // sent before this dispatcher was started
+  };
+  void QueueFrame(Arrived arrived);
   void GiveWork();
   void Watch();
   void FinishIfDone();
@@ -28,9 +37,13 @@ class DispatcherStage {
   std::map<int, Publisher<TileJob>> tiles_;  // by extractor
   Publisher<EndOfStream> end_of_stream_;
   std::optional<CameraCalibration> calibration_;
-  std::vector<std::pair<CameraFrame, int64_t>> before_calibration_;  // frames that overtook it, with their arrival
+  std::vector<Arrived> before_calibration_;  // frames that overtook it
   std::optional<EndOfStream> source_end_;
-  FrameId newest_;  // highest frame number that came
+  FrameId newest_;   // highest frame number that came
+  FrameId tracked_;  // this frame, and all before it, have a pose
+  std::optional<int64_t> first_camera_epoch_us_;  // of the first camera heard
+  std::optional<int64_t> reassembler_epoch_us_;   // of the last one heard
+  FrameId gap_begin_, gap_end_;  // the frames of the last gap: gap_begin_ .. gap_end_ - 1 did not come
   int64_t num_dropped_ = 0;
   int64_t last_activity_us_ = 0;  // when the last frame came
   bool warned_no_extractor_ = false;

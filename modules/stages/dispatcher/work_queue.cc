@@ -24,8 +24,9 @@ std::string WorkQueueOptions::Check() const {
 
 WorkQueue::WorkQueue(const WorkQueueOptions& options) : options_(options) {}
 
-bool WorkQueue::AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us) {
-  if (num_waiting() >= options_.max_queued_frames) {
+bool WorkQueue::AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us,
+                         bool must_keep) {
+  if (!must_keep && num_waiting() >= options_.max_queued_frames) {
     return false;
   }
   const FrameId id = frame.id;
@@ -48,21 +49,46 @@ void WorkQueue::HearExtractor(int extractor, int64_t epoch_us, int64_t now_us) {
 void WorkQueue::Acknowledge(FrameId frame, const std::vector<int32_t>& tiles) {
   for (const int32_t tile : tiles) {
     const JobKey key{frame, tile};
-    if (open_.erase(key) == 0) {
+    const auto job = jobs_.find(key);
+    if (job == jobs_.end() || job->second.is_acknowledged) {
       continue;  // answered twice
     }
+    job->second.is_acknowledged = true;
+    --num_open_;
     std::erase(to_give_, key);
-    ++turn_;
-    for (auto& [id, worker] : extractors_) {
-      if (worker.given_us.erase(key) > 0) {
-        worker.free_since = turn_;
-      }
+    FreeWorkersOf(key);
+  }
+}
+
+void WorkQueue::FreeWorkersOf(const JobKey& key) {
+  ++turn_;
+  for (auto& [id, worker] : extractors_) {
+    if (worker.given_us.erase(key) > 0) {
+      worker.free_since = turn_;
     }
   }
 }
 
+void WorkQueue::GiveAllAgain() {
+  to_give_.clear();
+  for (auto& [id, worker] : extractors_) worker.given_us.clear();
+  for (auto& [key, job] : jobs_) {
+    job.is_acknowledged = false;
+    to_give_.push_back(key);
+  }
+  num_open_ = static_cast<int64_t>(jobs_.size());
+  num_given_again_ += num_open_;
+}
+
 void WorkQueue::MarkTracked(FrameId frame) {
   untracked_.erase(untracked_.begin(), untracked_.upper_bound(frame));
+  while (!waiting_.empty() && waiting_.front().frame.id <= frame) waiting_.pop_front();
+  for (auto job = jobs_.begin(); job != jobs_.end() && job->first.frame <= frame; job = jobs_.erase(job)) {
+    if (job->second.is_acknowledged) continue;
+    --num_open_;  // its reassembler died after it had released the frame
+    std::erase(to_give_, job->first);
+    FreeWorkersOf(job->first);
+  }
 }
 
 bool WorkQueue::CanGive() const {
@@ -76,10 +102,10 @@ WorkQueue::Assignment WorkQueue::GiveNext(int64_t now_us) {
   }
   const JobKey key = to_give_.front();
   to_give_.pop_front();
-  const OpenJob& open = open_.at(key);
-  const int extractor = FreeExtractor(open.avoid);
+  const Job& job = jobs_.at(key);
+  const int extractor = FreeExtractor(job.avoid);
   extractors_.at(extractor).given_us[key] = now_us;
-  return {extractor, &open.job};
+  return {extractor, &job.job};
 }
 
 void WorkQueue::CheckExtractors(int64_t now_us) {
@@ -112,7 +138,8 @@ void WorkQueue::CutNextFrame() {
   for (TileJob& job : jobs) {
     job.previous_frame = next.previous_frame;
     const JobKey key{job.frame, job.tile};
-    open_[key].job = std::move(job);
+    jobs_[key].job = std::move(job);
+    ++num_open_;
     to_give_.push_back(key);
   }
   untracked_.insert(next.frame.id);
@@ -142,7 +169,7 @@ void WorkQueue::TakeBack(Worker& worker, int extractor) {
     if (std::find(to_give_.begin(), to_give_.end(), key) != to_give_.end()) {
       continue;
     }
-    open_.at(key).avoid = extractor;
+    jobs_.at(key).avoid = extractor;
     to_give_.push_front(key);
     ++num_given_again_;
   }

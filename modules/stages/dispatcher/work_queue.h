@@ -1,8 +1,9 @@
 // Who works on what: the frames that wait, the jobs they were cut into, and the extractors that are free.
 //
-// A job is given to a free extractor, and kept until the reassembler has acknowledged its candidates. It is given
-// again when its extractor died, restarted, or does not answer in time; answering twice does no harm, since the
-// answers are the same bit for bit. So wall time decides who works, never what comes out.
+// A job is given to a free extractor, and kept until its frame is tracked. It is given again when its extractor died,
+// restarted, or does not answer in time, and when the reassembler that acknowledged its candidates died with them;
+// answering twice does no harm, since the answers are the same bit for bit. So wall time decides who works, never what
+// comes out.
 #pragma once
 
 #include <cstdint>
@@ -36,12 +37,17 @@ class WorkQueue {
  public:
   explicit WorkQueue(const WorkQueueOptions& options);
 
-  // A frame has come; frames must come in order. False: the queue was full and the frame is dropped.
-  bool AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us);
+  // A frame has come; frames must come in order. False: the queue was full and the frame is dropped, unless it must be
+  // kept.
+  bool AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us, bool must_keep = false);
+  // A frame has come that was tracked before this queue was made.
+  void SkipFrame(FrameId frame) { last_frame_ = frame; }
   // An extractor says that it lives (`epoch_us`: since when).
   void HearExtractor(int extractor, int64_t epoch_us, int64_t now_us);
   // The reassembler has these tiles.
   void Acknowledge(FrameId frame, const std::vector<int32_t>& tiles);
+  // The reassembler lost all that it has acknowledged.
+  void GiveAllAgain();
   // The tracker has finished this frame and all before it.
   void MarkTracked(FrameId frame);
 
@@ -57,7 +63,7 @@ class WorkQueue {
   void CheckExtractors(int64_t now_us);
 
   // Nothing waits and everything given out is acknowledged.
-  bool idle() const { return waiting_.empty() && open_.empty(); }
+  bool idle() const { return waiting_.empty() && num_open_ == 0; }
   int num_waiting() const { return static_cast<int>(waiting_.size()); }
   int num_extractors() const { return static_cast<int>(extractors_.size()); }
   int num_in_flight() const { return static_cast<int>(untracked_.size()); }
@@ -71,9 +77,10 @@ class WorkQueue {
     int32_t tile = 0;
     auto operator<=>(const JobKey&) const = default;
   };
-  struct OpenJob {
+  struct Job {
     TileJob job;
     int avoid = -1;  // the extractor that failed it; another is preferred
+    bool is_acknowledged = false;
   };
   struct Waiting {
     CameraFrame frame;
@@ -90,12 +97,14 @@ class WorkQueue {
 
   void CutNextFrame();
   int FreeExtractor(int avoid) const;
+  void FreeWorkersOf(const JobKey& key);
   void TakeBack(Worker& worker, int extractor);
 
   WorkQueueOptions options_;
   std::deque<Waiting> waiting_;
-  std::map<JobKey, OpenJob> open_;  // cut and not yet acknowledged
-  std::deque<JobKey> to_give_;      // of those, the ones that nobody works on, in order
+  std::map<JobKey, Job> jobs_;   // of untracked frames
+  int64_t num_open_ = 0;         // of those, not acknowledged
+  std::deque<JobKey> to_give_;   // of those, the ones that nobody works on, in order
   std::set<FrameId> untracked_;     // frames cut and not yet tracked
   std::map<int, Worker> extractors_;
   FrameId last_frame_;

@@ -17,8 +17,9 @@ FrameAssembler::Result FrameAssembler::Add(TileFeatures tile) {
   const auto sibling = blocks_.lower_bound({tile.frame, 0});
   if (sibling != blocks_.end() && sibling->first.first == tile.frame) {
     const TileFeatures& other = sibling->second;
-    if (other.num_tiles != tile.num_tiles || other.previous_frame != tile.previous_frame ||
-        other.options != tile.options || other.calibration != tile.calibration) {
+    // A dispatcher that was started again need not drop the frames that the one before dropped: either's word on the
+    // previous frame will do.
+    if (other.num_tiles != tile.num_tiles || other.options != tile.options || other.calibration != tile.calibration) {
       return Result::kRefused;
     }
   } else if (num_open_frames() >= max_open_frames_) {
@@ -29,13 +30,20 @@ FrameAssembler::Result FrameAssembler::Add(TileFeatures tile) {
   return Result::kKept;
 }
 
+void FrameAssembler::SkipTo(FrameId frame) {
+  if (frame <= last_released_) return;
+  last_released_ = frame;
+  blocks_.erase(blocks_.begin(), blocks_.lower_bound({FrameId{frame.value + 1}, 0}));
+  num_blocks_.erase(num_blocks_.begin(), num_blocks_.upper_bound(frame));
+}
+
 bool FrameAssembler::CanRelease() const {
   if (num_blocks_.empty()) {
     return false;
   }
   const auto& [frame, num_blocks] = *num_blocks_.begin();
   const TileFeatures& first = blocks_.lower_bound({frame, 0})->second;
-  return num_blocks == first.num_tiles && first.previous_frame == last_released_;
+  return num_blocks == first.num_tiles && first.previous_frame <= last_released_;
 }
 
 FeatureFrame FrameAssembler::ReleaseNext() {

@@ -20,6 +20,8 @@ class FrameAssembler {
     kRefused,   // contradicts the tiles of its frame that are there, or too many frames are open
   };
   Result Add(TileFeatures tile);
+  // This frame, and all before it, need not be released: they were by an assembler before this one.
+  void SkipTo(FrameId frame);
 
   // Whether all tiles of the next frame in order are there.
   bool CanRelease() const;
@@ -27,7 +29,7 @@ class FrameAssembler {
   FeatureFrame ReleaseNext();
 
   int num_open_frames() const;
-  // The last frame released; invalid if none was.
+  // The last frame released, here or before; invalid if none was.
   FrameId last_released() const { return last_released_; }
 
  private:

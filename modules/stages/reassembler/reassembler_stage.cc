@@ -2,6 +2,7 @@
 
 #include "core/errors.h"
 #include "features/selection.h"
+#include "map/tracking_types.h"
 
 namespace tessera {
 namespace {
@@ -23,12 +24,18 @@ ReassemblerStage::ReassemblerStage(StageContext& context)
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
   context.Subscribe<TileFeatures>(kTileFeaturesChannel,
                                   [this](const TileFeatures& tile, const MessageInfo&) { OnTile(tile); });
+  // One that was started again goes on behind what is tracked.
+  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+    assembler_.SkipTo(pose.frame);
+    Release();
+  });
   context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
     if (end.stage == "dispatcher") {
       dispatcher_end_ = end;
       FinishIfDone();
     }
   });
+  acks_.Publish({.frame = {0}, .tiles = {}});  // nothing is here yet
 }
 
 void ReassemblerStage::OnTile(const TileFeatures& tile) {
@@ -44,6 +51,10 @@ void ReassemblerStage::OnTile(const TileFeatures& tile) {
   }
   // Acknowledged also when repeated: the first acknowledgement may be what was late.
   acks_.Publish({.frame = tile.frame, .tiles = {tile.tile}});
+  Release();
+}
+
+void ReassemblerStage::Release() {
   while (assembler_.CanRelease()) {
     FeatureFrame frame;
     {

@@ -15,6 +15,7 @@ class ReassemblerStage {
 
  private:
   void OnTile(const TileFeatures& tile);
+  void Release();
   void FinishIfDone();
 
   StageContext& context_;

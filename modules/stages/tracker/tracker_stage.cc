@@ -68,6 +68,8 @@ TrackerStage::TrackerStage(StageContext& context)
     if (asked_ && !IsAnswered()) requests_.Publish(*asked_);
   });
   context.Subscribe<FeatureFrame>(kFeaturesChannel, [this](const FeatureFrame& features, const MessageInfo&) {
+    if (features.frame <= last_received_) return;  // a reassembler that was started again repeats what isn't tracked yet
+    last_received_ = features.frame;
     waiting_.push_back(features);
     TrackWaiting();
   });

@@ -48,7 +48,8 @@ class TrackerStage {
   std::deque<FeatureFrame> waiting_;
   std::optional<int64_t> waits_since_us_;  // the first of them could be tracked, but for the map
   int64_t total_wait_us_ = 0;
-  FrameId last_frame_;
+  FrameId last_received_;
+  FrameId last_frame_;  // tracked
   int64_t num_keyframes_ = 0;
   std::optional<EndOfStream> features_end_;
 };

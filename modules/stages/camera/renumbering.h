@@ -1,0 +1,41 @@
+// Numbers and times of a live source that was opened again: it counts from 0, and the run must go on.
+#pragma once
+
+#include <cstdint>
+
+#include "geometry/camera_frame.h"
+
+namespace tessera {
+
+class Renumbering {
+ public:
+  // `num_on_the_way`: frames that may have been sent and not tracked when the camera before this one died.
+  explicit Renumbering(int64_t num_on_the_way) : num_on_the_way_(num_on_the_way) {}
+
+  // What the source yields gets the number and time that it has in the run.
+  void Apply(CameraFrame& frame) const {
+    frame.id.value += number_offset_;
+    frame.utime_us += time_offset_us_;
+  }
+  // Frame `tracked`, taken at `tracked_utime_us`, has a pose. If `frame` can't come after it, it and those to come are
+  // moved behind all that may be on its way; the numbers in between count as dropped.
+  void MoveBehind(FrameId tracked, int64_t tracked_utime_us, CameraFrame& frame) {
+    if (frame.id > tracked) return;
+    const int64_t number_step = tracked.value + num_on_the_way_ + 1 - frame.id.value;
+    const int64_t time_step_us = tracked_utime_us + kMissedUs - frame.utime_us;
+    frame.id.value += number_step;
+    frame.utime_us += time_step_us;
+    number_offset_ += number_step;
+    time_offset_us_ += time_step_us;
+  }
+
+ private:
+  // More than frames on their way and a restart take; how long it was is not known to a clock that began anew.
+  static constexpr int64_t kMissedUs = 3'000'000;
+
+  const int64_t num_on_the_way_;
+  int64_t number_offset_ = 0;
+  int64_t time_offset_us_ = 0;
+};
+
+}  // namespace tessera
