@@ -169,6 +169,8 @@ num_build_jobs() {
 }
 
 build() {
+  # Brought whole by `tessera deploy --built`; a deploy of sources takes the mark away.
+  [ ! -f "$root/build/.prebuilt" ] || return 0
   local stamp_file="$root/build/.tessera-stamp" wanted have="" status=0
   wanted="$(<"$root/.venv/.tessera-stamp")"
   [ ! -f "$stamp_file" ] || have="$(<"$stamp_file")"
@@ -187,6 +189,7 @@ build() {
     grep -E -A 12 'FAILED:|error:|ninja: error' "$setup_log" | tail -n 25 >&2
     fail "The build failed. The whole output is in $setup_log."
   fi
+  touch "$root/build/.built"
 }
 
 # setup_steps ask|tell
@@ -211,5 +214,5 @@ setup_machine() {
 
 # For commands that only want to start: asks on the first time, and says nothing when there is nothing to do.
 setup_quietly() {
-  if [ -f "$root/build/.tessera-stamp" ]; then setup_steps tell; else setup_steps ask; fi
+  if [ -f "$root/build/.tessera-stamp" ] || [ -f "$root/build/.prebuilt" ]; then setup_steps tell; else setup_steps ask; fi
 }

@@ -1,6 +1,7 @@
 """python -m tessera_cli COMMAND ...: exit status 0 done, 1 it failed, 2 the arguments or the input are at fault."""
 
 import importlib
+import os
 import sys
 
 from tessera_cli.arguments import parse_arguments
@@ -20,6 +21,10 @@ def main() -> int:
         return 1
     except KeyboardInterrupt:
         print("tessera: interrupted.", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # Whoever reads our output has enough of it, as `head` does; Python would complain once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 
 

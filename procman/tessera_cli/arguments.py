@@ -167,10 +167,12 @@ def add_look_commands(commands) -> None:
     keep_map = add_command(
         commands, "map", "keep_map", "Joins a running stack and writes its map as a cloud of points (PLY).",
         "Any viewer of point clouds opens the file: MeshLab, CloudCompare, Blender.\n\nexamples:\n"
-        "  procman/tessera map /tmp/now.ply\n  procman/tessera map /tmp/whole.ply --follow\n")
+        "  procman/tessera map /tmp/now.ply\n  procman/tessera map /tmp/whole.ply --follow\n"
+        "  procman/tessera map /tmp/robot_b.ply --prefix B_ --lan\n")
     keep_map.add_argument("path", metavar="OUT.ply", help="the file to write")
     keep_map.add_argument("--follow", action="store_true", help="write when the run has ended, not at once")
-    add_port(keep_map)
+    keep_map.add_argument("--prefix", metavar="TEXT", default="", help="the stack's bus.channel_prefix, where it has one")
+    add_lan_options(keep_map)
     experiment = add_command(commands, "experiment", "experiment", "Measurements, as a table, a CSV file and a plot under logs/.",
                              "examples:\n  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n")
     experiment.add_argument("name", metavar="NAME", choices=("extraction", "places", "worlds"),
@@ -216,6 +218,19 @@ def add_keys_command(commands) -> None:
     revoke.add_argument("name", metavar="NAME")
 
 
+def add_deploy_command(commands) -> None:
+    deploy = add_command(
+        commands, "deploy", "lan.deploy", "Copies the sources to nodes by ssh and rsync, and tells what each of them lacks.",
+        "NODE is [USER@]HOST or [USER@]HOST:FOLDER; the folder is `tessera` in the home folder where it is left out. Copied is what git tracks.\n"
+        "Exit status: 0 all nodes are ready, 1 one is not, 2 the arguments are at fault.\n\nexamples:\n"
+        "  procman/tessera deploy pi@board1 pi@board2 --setup\n  procman/tessera deploy node2:/opt/tessera --built --dry-run\n")
+    deploy.add_argument("nodes", metavar="NODE", nargs="+", help="see below")
+    deploy.add_argument("--built", action="store_true", help="the programs of this machine too, for nodes of its CPU type and system")
+    deploy.add_argument("--setup", action="store_true", help="then run `procman/tessera setup` there, which asks before it uses sudo")
+    deploy.add_argument("--dry-run", action="store_true", help="look, and change nothing")
+    deploy.add_argument("--ssh", metavar="COMMAND", default="ssh", help="default ssh; such as 'ssh -p 2222 -i KEY'")
+
+
 def add_lan_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lan", action="store_true",
                         help="speak to the network (ttl 1), not to this machine alone; TESSERA_LAN=1 in the environment does the same")
@@ -246,31 +261,34 @@ def add_deputy_command(commands) -> None:
 
 def add_sheriff_commands(commands) -> None:
     up = add_lan_command(
-        commands, "up", "lan.commands", "Starts the processes of a list on their nodes and waits until all are ready.",
+        commands, "up", "lan.up", "Starts the processes of a list on their nodes and waits until all are ready.",
         "Exit status: 0 all are ready (or the script ended well), 1 one can't or not in time, 2 the list or the arguments are at fault.\n\n"
         "examples:\n  procman/tessera up procman/local.pmd --set camera.source=kitti:DIR --out /tmp/run\n"
-        "  procman/tessera up procman/lan.pmd --lan --script run --set camera.source=kitti:DIR --out /tmp/run\n")
+        "  procman/tessera up procman/lan.pmd --lan --script run --set camera.source=kitti:DIR --out /tmp/run\n"
+        "  procman/tessera up procman/local.pmd --name robot_a --set bus.channel_prefix=A_ --set camera.source=kitti:DIR\n")
     up.add_argument("file", metavar="FILE", help="a process list, such as procman/lan.pmd")
+    up.add_argument("--name", metavar="NAME", default="", help="of the list; a second `up` of one name replaces the first; default: its file's")
     up.add_argument("--script", metavar="NAME", help="carry out this script of the list instead")
     up.add_argument("--out", metavar="DIR", help="the run's folder, on the node of the evaluator")
     up.add_argument("--set", dest="settings", type=assignment, metavar="section.key=value", action="append", default=[],
                     help="any setting of config/default.yaml; may be repeated")
     add_timeout(up, 60)
-    down = add_lan_command(commands, "down", "lan.commands", "Stops all processes of all deputies.", "examples:\n  procman/tessera down\n")
+    down = add_lan_command(commands, "down", "lan.commands", "Stops all processes of one list, or of all lists.",
+                           "examples:\n  procman/tessera down\n  procman/tessera down robot_a\n")
+    down.add_argument("name", metavar="NAME", nargs="?", default="", help="of the list, as `tessera status` shows it; default: all")
     add_timeout(down, 60)
     status = add_lan_command(commands, "status", "lan.commands", "Nodes and processes, once; exit status 1 if one failed.",
                              "examples:\n  procman/tessera status --json\n")
     status.add_argument("--json", action="store_true", help="for programs")
-    watch = add_lan_command(commands, "watch", "lan.watch", "Nodes, processes, frame rate and output, drawn anew until Ctrl-C.",
-                            "examples:\n  procman/tessera watch\n")
-    watch.add_argument("--prefix", metavar="TEXT", default="", help="the channel prefix of the stack whose poses are counted")
+    add_lan_command(commands, "watch", "lan.watch", "Nodes, processes, frame rates and output, drawn anew until Ctrl-C.",
+                    "examples:\n  procman/tessera watch\n")
     restart = add_lan_command(commands, "restart", "lan.commands", "Ends a process and starts it again; waits until it is ready.",
                               "examples:\n  procman/tessera restart mapper\n")
-    restart.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")
+    restart.add_argument("name", metavar="[LIST/]NAME", help="of the process, as `tessera status` shows it")
     add_timeout(restart, 60)
     log = add_lan_command(commands, "log", "lan.commands", "The last lines that a process wrote, from its node.",
                           "examples:\n  procman/tessera log tracker --follow\n")
-    log.add_argument("name", metavar="NAME", help="of the process, as `tessera status` shows it")
+    log.add_argument("name", metavar="[LIST/]NAME", help="of the process, as `tessera status` shows it")
     log.add_argument("--lines", type=whole_number(1, 10000), metavar="N", default=50, help="default 50")
     log.add_argument("--follow", action="store_true", help="and what it writes from now on, until Ctrl-C")
 
@@ -285,4 +303,5 @@ def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     add_deputy_command(commands)
     add_sheriff_commands(commands)
     add_keys_command(commands)
+    add_deploy_command(commands)
     return parser.parse_args(arguments)

@@ -11,6 +11,7 @@ from tessera_cli.bus import BusListener
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.lan.private_deputy import PrivateDeputy, helper
+from tessera_cli.lan.procman_bus import ttl_of
 from tessera_cli.lan.state_folder import LogFolder
 from tessera_cli.progress import FINISHED
 
@@ -24,8 +25,9 @@ def main(arguments: Namespace) -> int:
     path = Path(arguments.path).expanduser().absolute()
     if path.is_dir() or not path.parent.is_dir():
         raise UserError(f"{path} can't be written: name a file in a folder that exists.")
-    assignments = settings.port_assignments(arguments.port) + [
-        f"map_writer.path={path}", f"map_writer.follow={str(arguments.follow).lower()}"]
+    make = settings.lan_assignments if ttl_of(arguments) else settings.port_assignments
+    assignments = make(arguments.port) + [f"bus.channel_prefix={arguments.prefix}", f"map_writer.path={path}",
+                                          f"map_writer.follow={str(arguments.follow).lower()}"]
     with tempfile.TemporaryDirectory(prefix="tessera-map-") as folder:
         values = settings.write_settings(assignments, Path(folder) / "settings.yaml")
         _write_map(values, Path(folder))
@@ -39,7 +41,7 @@ def _write_map(values: dict, folder: Path) -> None:
     deputy = PrivateDeputy(LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper(name, "map_writer", STOP_TIME_S)])
     bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns)
     if bus.is_free():
-        raise UserError("no stack runs on this bus: start one, or give its --port N.")
+        raise UserError("no stack runs on this bus: start one, or give its --port N and --prefix TEXT (and --lan if it is on other machines).")
     interrupt = Interrupt()
     try:
         deputy.start()

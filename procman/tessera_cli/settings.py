@@ -11,6 +11,8 @@ from tessera_cli.files import BIN, ROOT
 from tessera_cli.sources import Source
 
 GROUP = "239.255.76.67"
+# A message that fits one packet of a LAN: the loss of a fragment would lose it whole.
+LAN_MESSAGE_BYTES = 1400
 FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
 # Keys that the command itself fills in.
 RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE", "tracker.live": "--live",
@@ -26,6 +28,12 @@ def bus_url(port: int) -> str:
 def port_assignments(port: int) -> list[str]:
     return [f"bus.main_url={bus_url(port)}", f"bus.camera_url={bus_url(port + 1)}", f"bus.work_url={bus_url(port + 2)}",
             f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}"]
+
+
+def lan_assignments(port: int) -> list[str]:
+    """As port_assignments, but for messages that leave this machine."""
+    tile_url = f"bus.tile_url=udpm://{GROUP}:{{port}}?ttl=1"
+    return [text.replace("?ttl=0", "?ttl=1") for text in port_assignments(port)] + [tile_url, f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
 
 
 def bus_assignments(source: Source, port: int) -> list[str]:

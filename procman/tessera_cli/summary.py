@@ -31,7 +31,25 @@ class RunFacts:
     messages_undecodable: int
 
 
+@dataclass(frozen=True)
+class ProcessFacts:
+    """What the processes of a run used, and how they fared."""
+
+    cpu_s: dict[str, float]
+    max_rss_mb: dict[str, float]
+    num_extractor_restarts: int
+    warnings: list[str]
+
+
 def summarize(folder: Path, facts: RunFacts, deputy: PrivateDeputy) -> dict:
+    """As write_summary, of a run of this machine."""
+    return write_summary(folder, facts, ProcessFacts(
+        cpu_s={process.name: process.cpu_s for process in deputy.processes},
+        max_rss_mb={process.name: process.max_rss_mb for process in deputy.processes},
+        num_extractor_restarts=deputy.num_restarts("extractor"), warnings=deputy.warnings))
+
+
+def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> dict:
     """Writes summary.json, trajectory.png and report.html, and returns the summary. Raises RunFailed if the evaluator wrote nothing."""
     evaluated = _read_evaluation(folder)
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
@@ -43,11 +61,11 @@ def summarize(folder: Path, facts: RunFacts, deputy: PrivateDeputy) -> dict:
         alignment=_in_words(result),
         wall_s=round(facts.wall_s, 3),
         frames_per_s=round(evaluated["frames"] / facts.wall_s, 3) if facts.wall_s > 0 else None,
-        cpu_s={process.name: round(process.cpu_s, 3) for process in deputy.processes},
-        max_rss_mb={process.name: round(process.max_rss_mb, 1) for process in deputy.processes},
+        cpu_s={name: round(cpu_s, 3) for name, cpu_s in processes.cpu_s.items()},
+        max_rss_mb={name: round(rss_mb, 1) for name, rss_mb in processes.max_rss_mb.items()},
         messages_undecodable=facts.messages_undecodable,
-        extractor_restarts=deputy.num_restarts("extractor"),
-        warnings=deputy.warnings,
+        extractor_restarts=processes.num_extractor_restarts,
+        warnings=processes.warnings,
         versions=collect_versions(),
     )
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")

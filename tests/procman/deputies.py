@@ -66,16 +66,17 @@ class Node:
         return subprocess.run(self.line(*arguments), env=environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               timeout=TIMEOUT_S)
 
-    def up(self, text: str, *options) -> subprocess.CompletedProcess:
-        path = self.folder / "list.pmd"
+    def up(self, text: str, *options, name: str = "list") -> subprocess.CompletedProcess:
+        path = self.folder / f"{name}.pmd"
         path.write_text(text)
         return self.command("up", path, *options)
 
     def status(self) -> dict:
         return json.loads(self.command("status", "--json").stdout)[self.deputy]
 
-    def processes(self) -> dict:
-        return self.status()["processes"]
+    def processes(self, name: str = "list") -> dict:
+        """Of this list; `up` makes one that is named so."""
+        return self.status()["lists"].get(name, {}).get("processes", {})
 
 
 def environment() -> dict[str, str]:

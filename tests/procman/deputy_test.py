@@ -114,7 +114,7 @@ def test_one_waits_for_another_and_says_for_whom(make_node):
     node = make_node(COMMANDS).start()
     text = listed("oneshot") + 'cmd "sleeper" { host = "node1"; ready_timeout_s = 1; auto_respawn = never; }' + listed("talker", more='depends = "sleeper";')
     up = node.up(text + 'script "s" { start cmd "talker"; wait cmd "talker" status "ready" timeout 1; }', "--script", "s")
-    assert up.returncode == 1 and "talker on node1 is waiting: waits for sleeper" in up.stderr
+    assert up.returncode == 1 and "talker on node1 is waiting: waits for list/sleeper" in up.stderr
     up = node.up(text + 'script "s" { start cmd "sleeper"; wait cmd "sleeper" status "ready" timeout 20; }', "--script", "s")
     assert up.returncode == 1 and "was not ready within 1 s" in up.stderr
     assert node.up(text + 'script "s" { start cmd "oneshot"; wait cmd "oneshot" status "finished"; }', "--script", "s").returncode == 0
@@ -180,6 +180,7 @@ def test_watch_prints_lines_without_a_terminal(make_node):
     try:
         assert watch.stdout.readline() == "no pose yet\n"
         assert watch.stdout.readline().startswith("node1 (")
+        assert watch.stdout.readline().startswith("  list: on udpm://")
         assert watch.stdout.readline().split()[:2] == ["sleeper", "ready"]
         watch.terminate()
         assert watch.wait(30) == 0
@@ -221,7 +222,7 @@ def test_of_a_thousand_bad_orders_on_the_bus_none_is_obeyed_and_all_are_counted(
     KeyRing(own_keys).trust("tests", to_text(KEY.verify_key.encode()))  # so that all kinds but strangers' get past the first question
     gate = Gate("node1", list)
     gate.nonce = before.nonce
-    replay = (node.folder / "state" / "last_order").read_bytes()
+    replay = (node.folder / "state" / "orders" / "list").read_bytes()
     randomness = random.Random(8)
     for number in range(1000):
         bus.publish("PROCMAN_ORDER", bad_order(gate, [replay], randomness))
@@ -229,7 +230,7 @@ def test_of_a_thousand_bad_orders_on_the_bus_none_is_obeyed_and_all_are_counted(
             wait_for(lambda: sum(hear_status(bus, heard).num_refused) - sum(before.num_refused) > number, "the count")
     status = heard[-1]
     assert sum(status.num_refused) - sum(before.num_refused) == 1000
-    assert status.num_obeyed == before.num_obeyed and [process.pid for process in status.processes] == [process.pid for process in before.processes]
+    assert status.num_obeyed == before.num_obeyed and [process.pid for process in status.lists[0].processes] == [process.pid for process in before.lists[0].processes]
 
 
 def test_a_revoked_key_is_obeyed_no_longer(make_node, own_keys):

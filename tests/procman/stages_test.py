@@ -19,6 +19,7 @@ from synthetic_sequence import write_sequence  # noqa: E402
 pytestmark = pytest.mark.skipif(not (BIN / "tessera-tracker").exists(), reason="the stages are not built: procman/tessera setup builds them")
 NUM_FRAMES = 60
 REFERENCE_PORT = FIRST_PORT - 50
+STAGES = ("camera", "dispatcher", "reassembler", "tracker", "mapper", "loop_closer", "global_adjuster", "evaluator")
 HASHES = ("trajectory_sha256", "map_sha256")
 
 
@@ -50,6 +51,28 @@ def test_a_script_runs_the_whole_stack_on_one_machine(make_node, sequence, refer
     finished = node.command(*run_script(node, "local.pmd", sequence, tmp_path / "out"))
     assert finished.returncode == 0 and "script run ended well" in finished.stdout, finished.stderr
     must_equal(tmp_path / "out", reference)
+    assert node.marked() == []
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert set(summary) == set(reference) and summary["source"] == f"kitti:{sequence}" and summary["extractors"] == 2
+    assert set(summary["cpu_s"]) == set(summary["max_rss_mb"]) == {*STAGES, "extractor_0", "extractor_1"}
+    assert summary["wall_s"] > 0 and summary["cpu_s"]["tracker"] > 0 and summary["max_rss_mb"]["tracker"] > 1
+    assert summary["warnings"] == [] and summary["extractor_restarts"] == 0
+    assert (tmp_path / "out" / "report.html").is_file() and f"report: {tmp_path / 'out' / 'report.html'}" in finished.stdout
+
+
+def test_two_robots_have_a_stack_each_on_one_deputy(make_node, sequence, reference, tmp_path):
+    node = make_node(deputy=os.uname().nodename).start()
+    lines = {name: node.line(*run_script(node, "local.pmd", sequence, tmp_path / name, "--name", name, "--set", f"bus.channel_prefix={name}_"))
+             for name in ("A", "B")}
+    scripts = [subprocess.Popen(line, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for line in lines.values()]
+    try:
+        for script in scripts:
+            assert script.wait(120) == 0, script.stdout.read()
+    finally:
+        for script in scripts:
+            script.kill()
+    for name in lines:
+        must_equal(tmp_path / name, reference)
     assert node.marked() == []
 
 

@@ -17,7 +17,7 @@ RESPAWN = {"always": "always", "failure": "failure", "killed": "killed", "never"
 class RunOptions:
     """How a process runs. All values are checked where they are read."""
 
-    ready: str = "status"            # ready when its stage status says RUNNING; "started": as soon as it exists
+    ready: str = "status"            # ready when its stage status says RUNNING; "started": when it exists for a moment
     ready_timeout_s: float = 30.0    # one that is not ready by then is ended and counts as died; LCM's self-test alone takes up to 10 s
     hang_timeout_s: float = 15.0     # a ready one without a stage status for so long hangs and is killed; 0: never. They come at 2 Hz
     auto_respawn: str = "failure"    # started again: always, after failure (not status 0 or 2), only when killed by a signal, never

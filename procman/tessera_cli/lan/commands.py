@@ -1,81 +1,44 @@
-"""tessera up, down, status, restart and log."""
+"""tessera down, status, restart and log."""
 
 import json
-import tempfile
 import time
 from argparse import Namespace
-from pathlib import Path
 
-from tessera_cli import settings
 from tessera_cli.errors import RunFailed, UserError
-from tessera_cli.lan.process_list import ProcessList, read_process_list
-from tessera_cli.lan.procman_bus import ttl_of
-from tessera_cli.lan.script import ScriptRunner
+from tessera_cli.lan.names import split
 from tessera_cli.lan.sheriff import TURN_S, Sheriff
 from tessera_cli.lan.supervised import READY, STATE_NAMES
-from tessera_cli.types import procman_order_t, procman_output_t, procman_process_t
+from tessera_cli.types import procman_list_t, procman_order_t, procman_output_t, procman_process_t
 
-# A message that fits one packet of a LAN: the loss of a fragment would lose it whole.
-LAN_MESSAGE_BYTES = 1400
 TAIL_TIMEOUT_S = 5.0
 STOPPED = (procman_process_t.STOPPED, procman_process_t.ENDED, procman_process_t.FAILED)
 
 
 def main(arguments: Namespace) -> int:
-    return {"up": up, "down": down, "status": status, "restart": restart, "log": log}[arguments.command](arguments)
+    return {"down": down, "status": status, "restart": restart, "log": log}[arguments.command](arguments)
 
 
 def say(sentence: str) -> None:
     print(f"tessera: {sentence}", flush=True)
 
 
-def up(arguments: Namespace) -> int:
-    process_list = read_process_list(Path(arguments.file))
-    if arguments.script and arguments.script not in process_list.scripts:
-        raise UserError(f"{arguments.file} has no script '{arguments.script}'; it has: {', '.join(process_list.scripts) or 'none'}.")
-    assignments = _assignments(process_list, arguments)
-    sheriff = Sheriff(arguments)
-    runner = ScriptRunner(sheriff, process_list, assignments, say)
-    sheriff.require_deputies(runner.hosts)
-    began = time.monotonic()
-    if arguments.script:
-        runner.carry_out(arguments.script)
-        say(f"script {arguments.script} ended well after {time.monotonic() - began:.1f} s")
-        return 0
-    names = list(process_list.processes)
-    runner.start(names)
-    runner.wait(names, "ready", arguments.timeout)
-    say(f"{len(names)} processes on {len(runner.hosts)} nodes are ready after {time.monotonic() - began:.1f} s")
-    return 0
-
-
-def _assignments(process_list: ProcessList, arguments: Namespace) -> list[str]:
-    """All settings of the run that differ from the defaults, checked."""
-    assignments = settings.port_assignments(arguments.port)
-    if ttl_of(arguments):
-        assignments = [text.replace("?ttl=0", "?ttl=1") for text in assignments]
-        assignments += [f"bus.tile_url=udpm://{settings.GROUP}:{{port}}?ttl=1", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
-    assignments += process_list.settings
-    if arguments.out:
-        assignments.append(f"evaluator.out_dir={Path(arguments.out).expanduser().absolute()}")
-    assignments += arguments.settings
-    with tempfile.TemporaryDirectory() as folder:
-        settings.write_settings(assignments, Path(folder) / "settings.yaml")
-    return assignments
-
-
 def down(arguments: Namespace) -> int:
+    """Ends one list, or all; the others are left alone."""
     sheriff = Sheriff(arguments)
     sheriff.meet()
-    # Those whose processes nobody waits for go first: the camera before the dispatcher. Each deputy does likewise with its own.
-    for deputy in sorted(sheriff.deputies):
-        sheriff.run(deputy, [], [], "")
+    if arguments.name and arguments.name not in sheriff.lists:
+        raise UserError(f"no deputy has a list '{arguments.name}'; there is: {', '.join(sheriff.lists) or 'none'}.")
+    deputies = sheriff.deputies_of(arguments.name) if arguments.name else sorted(sheriff.deputies)
+    # Each deputy ends first whom nobody of its own waits for: the camera before the dispatcher.
+    for deputy in deputies:
+        sheriff.run(deputy, arguments.name, [], [], "")
     until = time.monotonic() + arguments.timeout
-    while left := [name for name, (_, process) in sheriff.processes().items() if process.pid or process.state not in STOPPED]:
+    while left := [name for name, (_, process) in sheriff.processes().items()
+                   if arguments.name in ("", split(name)[0]) and (process.pid or process.state not in STOPPED)]:
         if time.monotonic() > until:
             raise RunFailed(f"still running after {arguments.timeout:g} s: {', '.join(left)}.")
         sheriff.listen(TURN_S)
-    say(f"all processes of {', '.join(sorted(sheriff.deputies))} are stopped")
+    say(f"all processes of {arguments.name or ', '.join(deputies)} are stopped")
     return 0
 
 
@@ -93,10 +56,15 @@ def status(arguments: Namespace) -> int:
 def _as_json(sheriff: Sheriff) -> dict:
     return {deputy: {"host": heard.status.host, "cpu_percent": heard.status.cpu_percent, "memory_percent": heard.status.memory_percent,
                      "orders_obeyed": heard.status.num_obeyed, "orders_refused": dict(zip(heard.status.kinds, heard.status.num_refused)),
-                     "processes": {process.name: {"state": STATE_NAMES.get(process.state, "?"), "reason": process.reason, "pid": process.pid,
-                                                  "starts": process.num_starts, "cpu_percent": process.cpu_percent, "rss_mb": process.rss_mb}
-                                   for process in heard.status.processes}}
+                     "lists": {each.name: _list_as_json(each) for each in heard.status.lists}}
             for deputy, heard in sorted(sheriff.deputies.items())}
+
+
+def _list_as_json(each: procman_list_t) -> dict:
+    return {"main_url": each.main_url, "channel_prefix": each.channel_prefix,
+            "processes": {process.name: {"state": STATE_NAMES.get(process.state, "?"), "reason": process.reason, "pid": process.pid,
+                                         "starts": process.num_starts, "cpu_percent": process.cpu_percent, "rss_mb": process.rss_mb}
+                          for process in each.processes}}
 
 
 def print_status(sheriff: Sheriff) -> None:
@@ -104,28 +72,34 @@ def print_status(sheriff: Sheriff) -> None:
         refused = sum(heard.status.num_refused)
         print(f"{deputy} ({heard.status.host}): CPU {heard.status.cpu_percent:.0f} %, memory {heard.status.memory_percent:.0f} %, "
               f"{heard.status.num_obeyed} orders obeyed, {refused} refused")
-        for process in heard.status.processes:
-            figures = f"{process.cpu_percent:5.0f} % {process.rss_mb:6.0f} MB  pid {process.pid}" if process.pid else ""
-            state = STATE_NAMES.get(process.state, "?")
-            print(f"  {process.name:20s} {state:12s} {process.num_starts:3d} starts {figures}  {process.reason}".rstrip())
+        for each in heard.status.lists:
+            print(f"  {describe_list(each)}")
+            for process in each.processes:
+                figures = f"{process.cpu_percent:5.0f} % {process.rss_mb:6.0f} MB  pid {process.pid}" if process.pid else ""
+                state = STATE_NAMES.get(process.state, "?")
+                print(f"    {process.name:20s} {state:12s} {process.num_starts:3d} starts {figures}  {process.reason}".rstrip())
+
+
+def describe_list(each: procman_list_t) -> str:
+    return f"{each.name}: on {each.main_url}" + (f", channels {each.channel_prefix}..." if each.channel_prefix else "")
 
 
 def restart(arguments: Namespace) -> int:
     sheriff = Sheriff(arguments)
     sheriff.meet()
+    name = sheriff.find(arguments.name)
     order = procman_order_t()
-    order.action, order.process = procman_order_t.RESTART, arguments.name
-    deputy = sheriff.deputy_of(arguments.name)
-    process = sheriff.processes()[arguments.name][1]
+    order.action, order.process = procman_order_t.RESTART, name
+    deputy, process = sheriff.processes()[name]
     starts = process.num_starts
     sheriff.send(deputy, order)
     until = time.monotonic() + arguments.timeout
     while process.num_starts == starts or process.state not in READY:
-        process = sheriff.processes().get(arguments.name, (deputy, process))[1]
+        process = sheriff.processes().get(name, (deputy, process))[1]
         if time.monotonic() > until or process.state == procman_process_t.FAILED:
-            raise RunFailed(f"{arguments.name} on {deputy} is {STATE_NAMES.get(process.state, '?')}: {process.reason or 'no reason given'}.")
+            raise RunFailed(f"{name} on {deputy} is {STATE_NAMES.get(process.state, '?')}: {process.reason or 'no reason given'}.")
         sheriff.listen(TURN_S)
-    say(f"{arguments.name} on {deputy} is ready again")
+    say(f"{name} on {deputy} is ready again")
     return 0
 
 
@@ -133,11 +107,12 @@ def log(arguments: Namespace) -> int:
     """The last lines of a process's log on its node; with --follow also what it says from now on."""
     sheriff = Sheriff(arguments)
     sheriff.meet()
-    deputy = sheriff.deputy_of(arguments.name)
+    name = sheriff.find(arguments.name)
+    deputy, _ = sheriff.processes()[name]
     pieces: list[procman_output_t] = []
     sheriff.on_output(pieces.append)
     order = procman_order_t()
-    order.action, order.process, order.num_lines = procman_order_t.TAIL, arguments.name, arguments.lines
+    order.action, order.process, order.num_lines = procman_order_t.TAIL, name, arguments.lines
     sent = sheriff.send(deputy, order)
     until = time.monotonic() + TAIL_TIMEOUT_S
     while not any(piece.order == sent and not piece.text for piece in pieces) and time.monotonic() < until:
@@ -147,6 +122,6 @@ def log(arguments: Namespace) -> int:
         pieces.clear()
         sheriff.listen(TURN_S)
         for piece in pieces:
-            if piece.process == arguments.name and not piece.order:
+            if piece.process == name and not piece.order:
                 print(piece.text, end="", flush=True)
     return 0

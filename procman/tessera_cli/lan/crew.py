@@ -9,7 +9,7 @@ from tessera_cli.lan.log_file import RotatingLog
 from tessera_cli.lan.state_folder import LogFolder
 from tessera_cli.lan.supervised import READY, STATE_NAMES, Supervised
 from tessera_cli.lan.tree import Trees
-from tessera_cli.types import procman_process_t, procman_status_t
+from tessera_cli.types import procman_process_t
 
 USAGE_PERIOD_S = 1.0
 # Deputies speak once a second; one that was not heard for longer may be gone, and its processes with it.
@@ -61,15 +61,16 @@ class Crew:
     def generations(self, run: str) -> dict[str, int]:
         return {name: member.wanted.generation for name, member in self._members.items() if member.wanted and member.wanted.run == run}
 
-    def want(self, launches: dict[str, Launch], session: str) -> None:
-        """Exactly these; the others are ended. Those that ended before are forgotten."""
-        for name in [name for name, member in self._members.items() if member.is_idle and name not in launches]:
+    def want(self, launches: dict[str, Launch], session: str, of: str = "") -> None:
+        """Of those whose names begin with `of` exactly these; the others are ended. Those that ended before are forgotten."""
+        for name in [name for name, member in self._members.items() if name.startswith(of) and member.is_idle and name not in launches]:
             self._members.pop(name).log.close()
         for name in [name for name in launches if name not in self._members]:
             log = RotatingLog(self._folder.log_path(name))
             self._members[name] = Supervised(name, self._folder.mark(name), log, self._on_output)
         for name, member in self._members.items():
-            member.want(launches.get(name), session)
+            if name.startswith(of):
+                member.want(launches.get(name), session)
 
     def restart(self, name: str, generation: int) -> None:
         member = self._members[name]
@@ -84,13 +85,15 @@ class Crew:
         if member and member.child and pid in {member.child.pid, *member.usage.pids}:
             member.on_stage_status(is_finished, heard_at)
 
-    def hear_of_others(self, status: procman_status_t, now: float) -> None:
-        for process in status.processes:
-            if process.name not in self._members:
-                self._others[process.name] = (process.state, now)
+    def hear_of_others(self, states: dict[str, int], now: float) -> None:
+        """States of another deputy's processes by name."""
+        for name, state in states.items():
+            if name not in self._members:
+                self._others[name] = (state, now)
 
-    def forget_others(self) -> None:
-        self._others.clear()
+    def forget_others(self, of: str) -> None:
+        """Those whose names begin with `of`."""
+        self._others = {name: heard for name, heard in self._others.items() if not name.startswith(of)}
 
     def step(self, now: float) -> None:
         """`now`: monotonic seconds, as everywhere here."""

@@ -1,7 +1,7 @@
 """tessera deputy: one on each node. Starts, watches and ends the processes that signed orders name.
 
 It needs nobody to keep going: without a sheriff it keeps its last orders, and takes them up again when it is started
-anew. When it dies, a guard ends what it left.
+anew. Several lists run beside each other, each with settings, a bus and orders of its own. When it dies, a guard ends what it left.
 """
 
 import os
@@ -19,13 +19,15 @@ from tessera_cli.lan.command_list import read_command_list
 from tessera_cli.lan.crew import Crew
 from tessera_cli.lan.guard import Guard
 from tessera_cli.lan.keys import KeyRing, key_folder
+from tessera_cli.lan.names import LIST, qualify, split
 from tessera_cli.lan.orders import Gate
 from tessera_cli.lan.output import OutputForwarder
 from tessera_cli.lan.procman_bus import ORDER, STATUS, Bus, procman_url
 from tessera_cli.lan.report import make_status
+from tessera_cli.lan.running_list import RunningList, listen_to
 from tessera_cli.lan.state_folder import StateFolder
 from tessera_cli.lan.wishes import run_of, to_launch
-from tessera_cli.progress import FINISHED, RUNNING
+from tessera_cli.progress import FINISHED
 from tessera_cli.types import procman_order_t, procman_status_t, stage_status_t
 
 STATUS_PERIOD_S = 1.0
@@ -51,10 +53,10 @@ class Deputy:
         self._ring.trusted()  # a fault in the file is told now
         self.gate = Gate(deputy_id, self._trusted)
         self._bus = Bus(url, f"deputy_{deputy_id}")
-        self._stages: Bus | None = None  # the main bus of the run
+        self._lists: dict[str, RunningList] = {}
         self._output = OutputForwarder(self._bus, deputy_id)
         self._crew = Crew(folder, self._output.add)
-        self._last_order, self._last_refusal, self._run = "", "", ""
+        self._last_order, self._last_refusal = "", ""
         self._num_restarts = 0
         self._twin = ""
         self._told: tuple = ()
@@ -101,7 +103,7 @@ class Deputy:
             raise UserError(f"a deputy with the id {self._id} runs on {self._twin} already: give one of them another --id NAME.")
 
     def _turn(self) -> None:
-        buses = [bus for bus in (self._bus, self._stages) if bus]
+        buses = [self._bus, *(each.bus for each in self._lists.values())]
         self._wait(TURN_S, buses + self._crew.talkers)
         for bus in buses:
             bus.handle_waiting()
@@ -124,12 +126,13 @@ class Deputy:
             if not self._twin:
                 self._say(f"another deputy with the id {self._id} speaks, on {status.host}")
             self._twin = status.host
-        elif status.run == self._run:
-            self._crew.hear_of_others(status, time.monotonic())
+            return
+        for each in status.lists:
+            if each.name in self._lists and each.run == self._lists[each.name].run:
+                self._crew.hear_of_others({qualify(each.name, process.name): process.state for process in each.processes}, time.monotonic())
 
-    def _on_stage(self, status: stage_status_t) -> None:
-        if status.host == os.uname().nodename and RUNNING <= status.state <= FINISHED:
-            self._crew.on_stage_status(status.name, status.pid, status.state == FINISHED, time.monotonic())
+    def _on_stage(self, list_name: str, status: stage_status_t) -> None:
+        self._crew.on_stage_status(qualify(list_name, status.name), status.pid, status.state == FINISHED, time.monotonic())
 
     def _on_order(self, data: bytes) -> None:
         order = self.gate.check(data)
@@ -140,23 +143,24 @@ class Deputy:
         self._last_order, self._last_refusal = order.order, ""
         try:
             self._obey(order)
-            if order.action == procman_order_t.RUN:
-                self._folder.keep_order(data)
+            if order.action == procman_order_t.RUN and order.wishes:
+                self._folder.keep_order(order.list, data)
         except (UserError, RunFailed, OSError) as error:
             self._last_refusal = str(error)
             self._say(f"order refused: {error}")
         self._publish_status()
 
     def _resume(self) -> None:
-        """Takes up the last order of an earlier life: it was fresh then, and must still be signed by who is trusted."""
-        order = self.gate.recognize(self._folder.last_order())
-        if order is None or not order.wishes:
-            return
-        self._say(f"going on with the last order: {', '.join(wish.name for wish in order.wishes)}")
-        try:
-            self._obey(order)
-        except (UserError, RunFailed, OSError) as error:
-            self._say(f"order refused: {error}")
+        """Takes up each list's last order of an earlier life: it was fresh then, and must still be signed by who is trusted."""
+        for data in self._folder.last_orders():
+            order = self.gate.recognize(data)
+            if order is None or order.action != procman_order_t.RUN:
+                continue
+            self._say(f"going on with the last order of {order.list}: {', '.join(wish.name for wish in order.wishes)}")
+            try:
+                self._obey(order)
+            except (UserError, RunFailed, OSError) as error:
+                self._say(f"order refused: {error}")
 
     def _obey(self, order: procman_order_t) -> None:
         if order.action == procman_order_t.RUN:
@@ -173,30 +177,48 @@ class Deputy:
 
     def _obey_run(self, order: procman_order_t) -> None:
         """All or nothing: a list with one bad wish changes nothing."""
+        if not order.wishes:
+            self._end(order.list, order.session)
+            return
         names = [wish.name for wish in order.wishes]
         if len(set(names)) < len(names):
             raise UserError("two wishes have the same name.")
-        if not names:
-            self._crew.want({}, order.session)
-            return
+        if not LIST.fullmatch(order.list):
+            raise UserError(f"'{order.list}' is no name of a list.")
         run = run_of(order.settings)
         values = {"bin": str(BIN), "settings": str(self._folder.settings_path(run))}
         generations = self._crew.generations(run)
-        launches = {wish.name: to_launch(wish, self._commands, values, run, generations.get(wish.name, 0)) for wish in order.wishes}
-        if run != self._run:
-            self._begin_run(run, order.settings)
-        self._crew.want(launches, order.session)
+        launches = {}
+        for wish in order.wishes:
+            name = qualify(order.list, wish.name)
+            launches[name] = to_launch(wish, self._commands, values, run, generations.get(name, 0), order.list)
+        if order.list not in self._lists or run != self._lists[order.list].run:
+            self._begin(order.list, run, order.settings)
+        self._forget_ended(order.list)
+        self._crew.want(launches, order.session, qualify(order.list, ""))
 
-    def _begin_run(self, run: str, assignments: list[str]) -> None:
+    def _begin(self, list_name: str, run: str, assignments: list[str]) -> None:
         merged = settings.write_settings(assignments, self._folder.settings_path(run))
-        stages = Bus(merged["bus"]["main_url"], f"deputy_{self._id}")
-        stages.subscribe(merged["bus"]["channel_prefix"] + "STATUS", stage_status_t, self._on_stage)
-        self._stages, self._run = stages, run
-        self._folder.forget_other_settings(run)
-        self._crew.forget_others()
+        self._lists[list_name] = listen_to(list_name, run, merged, f"deputy_{self._id}", self._on_stage)
+        self._crew.forget_others(qualify(list_name, ""))
+        self._folder.keep_settings({each.run for each in self._lists.values()})
+
+    def _end(self, list_name: str, session: str) -> None:
+        """All lists if it is empty."""
+        for name in list(self._lists):
+            if list_name in ("", name):
+                self._crew.want({}, session, qualify(name, ""))
+        self._folder.forget_orders(list_name)
+
+    def _forget_ended(self, ordered: str) -> None:
+        """Other lists of which nothing is left but what was shown as stopped."""
+        for name in list(self._lists):
+            if name != ordered and all(member.is_idle for member in self._crew.processes if split(member.name)[0] == name):
+                self._crew.want({}, "", qualify(name, ""))
+                del self._lists[name]
 
     def _publish_status(self) -> None:
         self._status_at = time.monotonic()
-        status = make_status(self._bus.header(STATUS), self.gate, self._crew.processes, self._status_at)
-        status.last_order, status.last_refusal, status.run = self._last_order, self._last_refusal, self._run
+        status = make_status(self._bus.header(STATUS), self.gate, self._lists.values(), self._crew.processes, self._status_at)
+        status.last_order, status.last_refusal = self._last_order, self._last_refusal
         self._bus.publish(STATUS, status.encode())

@@ -13,6 +13,7 @@ class RotatingLog:
     def __init__(self, path: Path, max_bytes: int = MAX_BYTES, num_old: int = NUM_OLD):
         self.path = path
         self._max_bytes, self._num_old = max_bytes, num_old
+        path.parent.mkdir(parents=True, exist_ok=True)  # that of its list
         self._file = open(path, "ab")
 
     def write(self, data: bytes) -> None:

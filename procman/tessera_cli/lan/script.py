@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from tessera_cli.errors import RunFailed
+from tessera_cli.lan.names import processes_of, qualify
 from tessera_cli.lan.orders import draw_order_id
 from tessera_cli.lan.process_list import Process, ProcessList, ScriptStep
 from tessera_cli.lan.sheriff import TURN_S, Sheriff
@@ -20,8 +21,9 @@ HOPELESS = {"ready": (states.FAILED, states.ENDED), "finished": (states.FAILED,)
 class ScriptRunner:
     """One run of one list: what was started so far is what the deputies are told to have."""
 
-    def __init__(self, sheriff: Sheriff, process_list: ProcessList, settings: list[str], say: Callable[[str], None]):
-        self._sheriff, self._list, self._settings, self._say = sheriff, process_list, settings, say
+    def __init__(self, sheriff: Sheriff, name: str, process_list: ProcessList, settings: list[str], say: Callable[[str], None]):
+        """`name`: that the deputies know the list by."""
+        self._sheriff, self._name, self._list, self._settings, self._say = sheriff, name, process_list, settings, say
         self._started: set[str] = set()
         self._session = draw_order_id()
 
@@ -57,16 +59,22 @@ class ScriptRunner:
         self._started.difference_update(names)
         self._order(names)
 
+    def leave_other_hosts(self) -> None:
+        """Nodes that have the list from before and are not in it any more."""
+        for deputy in self._sheriff.deputies_of(self._name):
+            if deputy not in self.hosts:
+                self._sheriff.run(deputy, self._name, [], [], self._session)
+
     def _order(self, names: Iterable[str]) -> None:
         hosts = {self.host(self._list.processes[name]) for name in names}
         for host in sorted(hosts):
             wanted = [process for name, process in self._list.processes.items() if name in self._started and self.host(process) == host]
-            self._sheriff.run(host, wanted, self._settings, self._session)
+            self._sheriff.run(host, self._name, wanted, self._settings, self._session)
 
     def _restart(self, names: Iterable[str]) -> None:
         for name in names:
             order = procman_order_t()
-            order.action, order.process = procman_order_t.RESTART, name
+            order.action, order.process = procman_order_t.RESTART, qualify(self._name, name)
             self._sheriff.send(self.host(self._list.processes[name]), order)
 
     def _wait_of(self, step: ScriptStep) -> None:
@@ -88,20 +96,20 @@ class ScriptRunner:
             self._sheriff.listen(TURN_S)
 
     def _state(self, name: str) -> int:
+        process = self._process(name)
+        return process.state if process else states.STOPPED
+
+    def _process(self, name: str) -> states | None:
         heard = self._sheriff.deputies.get(self.host(self._list.processes[name]))
-        for process in heard.status.processes if heard else ():
-            if process.name == name:
-                return process.state
-        return states.STOPPED
+        return processes_of(heard.status).get(qualify(self._name, name)) if heard else None
 
     def _describe(self, name: str) -> str:
         host = self.host(self._list.processes[name])
         heard = self._sheriff.deputies.get(host)
         if heard is None or heard.is_silent:
             return f"{name}: its deputy {host} says nothing any more"
-        for process in heard.status.processes:
-            if process.name == name:
-                return f"{name} on {host} is {STATE_NAMES.get(process.state, '?')}" + (f": {process.reason}" if process.reason else "")
+        if process := self._process(name):
+            return f"{name} on {host} is {STATE_NAMES.get(process.state, '?')}" + (f": {process.reason}" if process.reason else "")
         return f"{name} on {host} is not started"
 
     def _tell_changes(self, names: list[str], told: dict[str, str]) -> None:

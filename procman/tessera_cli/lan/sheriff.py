@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.lan.keys import KeyRing, key_folder
+from tessera_cli.lan.names import processes_of, split
 from tessera_cli.lan.orders import draw_order_id, sign
 from tessera_cli.lan.process_list import Process
 from tessera_cli.lan.procman_bus import ORDER, OUTPUT, STATUS, Bus, procman_url, ttl_of
@@ -51,10 +52,18 @@ class Sheriff:
         self._is_lan = bool(ttl_of(arguments))
         self._bus = Bus(procman_url(arguments), f"sheriff_{os.getpid()}")
         self._bus.subscribe(STATUS, procman_status_t, self._on_status)
+        self._others: list[Bus] = []
         self.deputies: dict[str, Heard] = {}
 
     def _on_status(self, status: procman_status_t) -> None:
         self.deputies[status.deputy] = Heard(status, time.monotonic())
+
+    def on_status(self, handler: Callable[[procman_status_t], None]) -> None:
+        self._bus.subscribe(STATUS, procman_status_t, handler)
+
+    def also_listen_to(self, buses: list[Bus]) -> None:
+        """While it listens to deputies; instead of those given before."""
+        self._others = buses
 
     def on_output(self, handler: Callable[[procman_output_t], None]) -> None:
         self._bus.subscribe(OUTPUT, procman_output_t, handler)
@@ -62,8 +71,8 @@ class Sheriff:
     def listen(self, seconds: float) -> None:
         until = time.monotonic() + seconds
         while (left_s := until - time.monotonic()) > 0:
-            if select.select([self._bus], [], [], left_s)[0]:
-                self._bus.handle_waiting()
+            for bus in select.select([self._bus, *self._others], [], [], left_s)[0]:
+                bus.handle_waiting()
 
     def meet(self) -> None:
         """Hears every deputy once."""
@@ -82,10 +91,13 @@ class Sheriff:
                                 f"Start it there: procman/tessera deputy --id {missing[0]}{self._hint()}")
             self.listen(TURN_S)
 
-    def run(self, deputy: str, processes: list[Process], settings: list[str], session: str) -> None:
-        """The deputy is to have exactly these processes. Raises RunFailed with its sentence if it refuses."""
+    def run(self, deputy: str, list_name: str, processes: list[Process], settings: list[str], session: str) -> None:
+        """The deputy is to have exactly these processes of the list; none: it ends, and all lists if it has no name.
+
+        Raises RunFailed with the deputy's sentence if it refuses.
+        """
         order = procman_order_t()
-        order.action, order.session = procman_order_t.RUN, session
+        order.action, order.list, order.session = procman_order_t.RUN, list_name, session
         order.settings, order.num_settings = settings, len(settings)
         order.wishes = [to_wish(process) for process in processes]
         order.num_wishes = len(order.wishes)
@@ -117,12 +129,25 @@ class Sheriff:
         return (f"the deputy {deputy} does not obey (it has refused: {refused or 'none'}): does it trust this user's key? "
                 "procman/tessera keys shows both.")
 
-    def processes(self) -> dict[str, tuple[str, procman_process_t]]:
-        """All of all deputies: (deputy, process) by name."""
-        return {process.name: (deputy, process) for deputy, heard in sorted(self.deputies.items()) for process in heard.status.processes}
+    def deputies_of(self, list_name: str) -> list[str]:
+        """Those that have it, sorted."""
+        return sorted(deputy for deputy, heard in self.deputies.items() if any(each.name == list_name for each in heard.status.lists))
 
-    def deputy_of(self, process: str) -> str:
-        found = self.processes()
-        if process not in found:
-            raise UserError(f"no deputy has a process '{process}'; there is: {', '.join(found) or 'none'}.")
-        return found[process][0]
+    @property
+    def lists(self) -> list[str]:
+        return sorted({each.name for heard in self.deputies.values() for each in heard.status.lists})
+
+    def processes(self) -> dict[str, tuple[str, procman_process_t]]:
+        """All of all deputies: (deputy, process) by LIST/PROCESS."""
+        return {name: (deputy, process) for deputy, heard in sorted(self.deputies.items())
+                for name, process in processes_of(heard.status).items()}
+
+    def find(self, process: str) -> str:
+        """LIST/PROCESS of what people call so; the list may be left out where only one has it."""
+        names = list(self.processes())
+        found = [process] if process in names else [name for name in names if split(name)[1] == process]
+        if not found:
+            raise UserError(f"no deputy has a process '{process}'; there is: {', '.join(names) or 'none'}.")
+        if len(found) > 1:
+            raise UserError(f"several lists have a '{process}': say which, {' or '.join(found)}.")
+        return found[0]

@@ -1,4 +1,4 @@
-"""A deputy's folder: the logs of its processes; on a node also the last order it obeyed, and their settings."""
+"""A deputy's folder: the logs of its processes; on a node also the last order of each list that it obeyed, and their settings."""
 
 import fcntl
 import os
@@ -37,7 +37,7 @@ class StateFolder(LogFolder):
 
     def __init__(self, path: Path, deputy: str):
         super().__init__(path, f"a deputy with the id {deputy} and this port runs on this machine already: give --id NAME or --port N.")
-        self._order_path = path / "last_order"
+        (path / "orders").mkdir(exist_ok=True)
 
     def log_path(self, process: str) -> Path:
         return self.path / "logs" / f"{process}.log"
@@ -45,14 +45,26 @@ class StateFolder(LogFolder):
     def settings_path(self, run: str) -> Path:
         return self.path / f"settings-{run}.yaml"
 
-    def forget_other_settings(self, run: str) -> None:
+    def keep_settings(self, runs: set[str]) -> None:
+        """Of these runs; those of others are removed."""
+        kept = {self.settings_path(run) for run in runs}
         for path in self.path.glob("settings-*.yaml"):
-            if path != self.settings_path(run):
+            if path not in kept:
                 path.unlink(missing_ok=True)
 
-    def keep_order(self, data: bytes) -> None:
-        with replacing(self._order_path) as written:
+    def keep_order(self, list_name: str, data: bytes) -> None:
+        with replacing(self.path / "orders" / list_name) as written:
             written.write_bytes(data)
 
-    def last_order(self) -> bytes:
-        return self._order_path.read_bytes() if self._order_path.exists() else b""
+    def forget_orders(self, list_name: str) -> None:
+        """Of all lists if it is empty."""
+        for path in self._orders():
+            if list_name in ("", path.name):
+                path.unlink()
+
+    def last_orders(self) -> list[bytes]:
+        """One of each list that was not ended."""
+        return [path.read_bytes() for path in self._orders()]
+
+    def _orders(self) -> list[Path]:
+        return sorted((self.path / "orders").glob("[!.]*"))

@@ -20,6 +20,8 @@ from tessera_cli.types import procman_process_t as states
 # A start after a death waits this long, twice as long each time in a row.
 FIRST_BACK_OFF_S = 0.1
 LONGEST_BACK_OFF_S = 5.0
+# One of ready = "started" that lived this long is ready: what ends at once with an error never was.
+SETTLED_AFTER_S = 0.3
 # One that lived this long begins anew with the shortest wait.
 STABLE_AFTER_S = 10.0
 # One that dies so often in a row has a fault that starting it again does not mend; auto_respawn = "always" tries for ever.
@@ -132,11 +134,13 @@ class Supervised:
             return
         self.num_starts += 1
         self.started_at = self._heard_at = now
-        self.state = states.READY if self._running.options.ready == "started" else states.STARTING
+        self.state = states.STARTING
 
     def _watch(self, now: float) -> None:
         options = self._running.options
-        if self.state == states.STARTING and now - self._heard_at > options.ready_timeout_s:
+        if self.state == states.STARTING and options.ready == "started" and now - self.started_at > SETTLED_AFTER_S:
+            self.state = states.READY
+        elif self.state == states.STARTING and now - self._heard_at > options.ready_timeout_s:
             self._kill(f"was not ready within {options.ready_timeout_s:g} s")
         elif self.state in READY and options.ready == "status" and 0 < options.hang_timeout_s < now - self._heard_at:
             self._kill(f"said nothing for {options.hang_timeout_s:g} s")

@@ -50,6 +50,7 @@ class Usage:
 
     pids: frozenset[int] = frozenset()
     cpu_percent: float = 0.0  # since the snapshot before; 100 is one core
+    total_cpu_s: float = 0.0  # of these processes since their starts
     rss_mb: float = 0.0       # 10^6 bytes
 
 
@@ -74,7 +75,7 @@ class Trees:
     def _usage(self, root: int, children: dict[int, list[int]], before: dict[int, float], elapsed_s: float) -> Usage:
         import psutil
 
-        pids, rss_bytes, cpu_s = [root], 0, 0.0
+        pids, rss_bytes, cpu_s, total_cpu_s = [root], 0, 0.0, 0.0
         for pid in pids:
             pids += children.get(pid, [])
             try:
@@ -85,4 +86,5 @@ class Trees:
                 continue
             self._cpu_s[pid] = times.user + times.system
             cpu_s += self._cpu_s[pid] - before.get(pid, self._cpu_s[pid])
-        return Usage(frozenset(pids), 100 * cpu_s / elapsed_s if elapsed_s > 0 else 0.0, rss_bytes / 1e6)
+            total_cpu_s += self._cpu_s[pid]
+        return Usage(frozenset(pids), 100 * cpu_s / elapsed_s if elapsed_s > 0 else 0.0, total_cpu_s, rss_bytes / 1e6)

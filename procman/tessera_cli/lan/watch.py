@@ -1,4 +1,4 @@
-"""tessera watch: nodes and processes, how fast poses come, and what processes say, drawn anew twice a second until Ctrl-C."""
+"""tessera watch: nodes and processes, how fast the poses of each list come, and what processes say, drawn anew twice a second until Ctrl-C."""
 
 import sys
 import time
@@ -6,19 +6,15 @@ from argparse import Namespace
 from collections import deque
 
 from tessera_cli.interrupt import Interrupt
-from tessera_cli.lan.commands import print_status
-from tessera_cli.lan.procman_bus import Bus, ttl_of
+from tessera_cli.lan.commands import describe_list, print_status
+from tessera_cli.lan.list_view import ListView
 from tessera_cli.lan.sheriff import Sheriff
 from tessera_cli.lan.supervised import STATE_NAMES
-from tessera_cli.panel import describe_time
-from tessera_cli.progress import Progress
-from tessera_cli.settings import bus_url
-from tessera_cli.types import pose_t, procman_output_t, procman_process_t, stage_status_t
+from tessera_cli.types import procman_output_t, procman_process_t, stage_status_t
 
 PANEL_PERIOD_S = 0.5
 LINES_PERIOD_S = 5.0
 NUM_LINES = 6
-TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
 STYLES = {procman_process_t.READY: "green", procman_process_t.FINISHED: "green", procman_process_t.FAILED: "bold red",
           procman_process_t.BACKING_OFF: "yellow", procman_process_t.WAITING: "yellow", procman_process_t.STARTING: "yellow"}
 
@@ -33,40 +29,31 @@ class Watcher:
     def __init__(self, arguments: Namespace):
         self._sheriff = Sheriff(arguments)
         self._sheriff.on_output(self._on_output)
-        self._stages = Bus(bus_url(arguments.port).replace("?ttl=0", f"?ttl={ttl_of(arguments)}"), "watch")
-        self._stages.subscribe(arguments.prefix + "STATUS", stage_status_t, self._on_stage)
-        self._stages.subscribe(arguments.prefix + "POSE", pose_t, self._on_pose)
-        self._progress = Progress()
-        self._statuses: dict[str, stage_status_t] = {}
+        self._views: dict[tuple[str, str, str], ListView] = {}  # by list, bus and prefix
         self._lines: deque[str] = deque(maxlen=NUM_LINES)
 
     def _on_output(self, output: procman_output_t) -> None:
         if not output.order:
             self._lines.extend(f"{output.process}: {line}" for line in output.text.splitlines())
 
-    def _on_stage(self, status: stage_status_t) -> None:
-        self._statuses[status.name] = status
-        values = dict(zip(status.value_names, status.values))
-        if status.name == "camera" and values.get("num_frames", 0) > 0:
-            self._progress.num_frames = int(values["num_frames"])
-
-    def _on_pose(self, pose: pose_t) -> None:
-        if pose.header.publisher == "tracker" and pose.state in TRACKING_STATES:
-            if pose.frame <= self._progress.last_frame:  # another run has begun
-                self._progress = Progress(num_frames=self._progress.num_frames)
-            self._progress.add_pose(pose.frame, TRACKING_STATES[pose.state])
+    def _follow_lists(self) -> None:
+        """Listens to lists that came, and no longer to those that went."""
+        wanted = {(each.name, each.main_url, each.channel_prefix)
+                  for heard in self._sheriff.deputies.values() for each in heard.status.lists}
+        self._views = {key: self._views.get(key) or ListView(*key[1:]) for key in sorted(wanted)}
+        self._sheriff.also_listen_to([view.bus for view in self._views.values()])
 
     def _listen(self, seconds: float) -> None:
         until = time.monotonic() + seconds
         while (left_s := until - time.monotonic()) > 0:
             self._sheriff.listen(min(left_s, 0.05))
-            self._stages.handle_waiting()
+            self._follow_lists()
 
     def print_until(self, interrupt: Interrupt) -> int:
         """For logs and pipes."""
         while not interrupt.requested:
             self._listen(LINES_PERIOD_S)
-            print(self._progress_line())
+            print("\n".join(self._progress_lines()))
             print_status(self._sheriff)
             sys.stdout.flush()
         return 0
@@ -80,13 +67,10 @@ class Watcher:
                 live.update(self._draw(), refresh=True)
         return 0
 
-    def _progress_line(self) -> str:
-        progress = self._progress
-        if progress.num_poses == 0:
-            return "no pose yet"
-        of_all = f" of {progress.num_frames}" if progress.num_frames else ""
-        return (f"frame {progress.last_frame + 1}{of_all}, {progress.frames_per_s:.1f}/s, {describe_time(progress.time_left_s)} left, "
-                f"{progress.tracking_state}")
+    def _progress_lines(self) -> list[str]:
+        """One for each list whose tracker speaks."""
+        lines = [f"{name}: {words}" for (name, _, _), view in self._views.items() if (words := view.in_words())]
+        return lines or ["no pose yet"]
 
     def _draw(self):
         from rich import box
@@ -95,7 +79,7 @@ class Watcher:
         from rich.text import Text
 
         lines = Text("\n".join(self._lines) or "no output yet", style="dim", overflow="ellipsis", no_wrap=True)
-        return Panel(Group(Text(self._progress_line()), self._draw_table(), lines), title="tessera watch", box=box.ROUNDED)
+        return Panel(Group(Text("\n".join(self._progress_lines())), self._draw_table(), lines), title="tessera watch", box=box.ROUNDED)
 
     def _draw_table(self):
         from rich import box
@@ -114,15 +98,18 @@ class Watcher:
             said = "says nothing any more" if heard.is_silent else f"{refused} orders refused" if refused else ""
             table.add_row(Text(deputy, style="bold"), Text("silent" if heard.is_silent else "", style="bold red"), "", "", "",
                           f"{status.cpu_percent:.0f}", f"{status.memory_percent:.0f} %", Text(said))
-            for process in status.processes:
-                table.add_row(*self._row(process))
+            for each in status.lists:
+                table.add_row(Text(f"  {describe_list(each)}", style="dim"))
+                statuses = self._views[each.name, each.main_url, each.channel_prefix].statuses
+                for process in each.processes:
+                    table.add_row(*self._row(process, statuses.get((process.name, process.pid))))
         return table
 
-    def _row(self, process: procman_process_t) -> tuple:
+    @staticmethod
+    def _row(process: procman_process_t, stage: stage_status_t | None) -> tuple:
         from rich.text import Text
 
-        stage = self._statuses.get(process.name) if process.pid else None
         runs = bool(process.pid)
-        return (f"  {process.name}", Text(STATE_NAMES.get(process.state, "?"), style=STYLES.get(process.state, "")), str(process.num_starts),
+        return (f"    {process.name}", Text(STATE_NAMES.get(process.state, "?"), style=STYLES.get(process.state, "")), str(process.num_starts),
                 str(stage.queue) if stage else "", f"{stage.step_median_ms:.1f}" if stage else "",
                 f"{process.cpu_percent:.0f}" if runs else "", f"{process.rss_mb:.0f}" if runs else "", Text(process.reason))

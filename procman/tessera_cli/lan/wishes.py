@@ -7,6 +7,7 @@ from tessera_cli.errors import UserError
 from tessera_cli.lan.attributes import MAX_INSTANCES, NAME, OPTIONS, RunOptions
 from tessera_cli.lan.child import Launch
 from tessera_cli.lan.command_list import LocalCommand
+from tessera_cli.lan.names import qualify
 from tessera_cli.lan.process_list import Process
 from tessera_cli.types import procman_wish_t
 
@@ -25,16 +26,20 @@ def to_wish(process: Process) -> procman_wish_t:
     return wish
 
 
-def to_launch(wish: procman_wish_t, commands: dict[str, LocalCommand], values: dict[str, str], run: str, generation: int) -> Launch:
-    """`values`: of the placeholders, but for the process's own. Raises UserError for a wish that can't be granted."""
+def to_launch(wish: procman_wish_t, commands: dict[str, LocalCommand], values: dict[str, str], run: str, generation: int,
+              list_name: str = "") -> Launch:
+    """`values`: of the placeholders, but for the process's own. `list_name`: empty where there is but one list.
+
+    Raises UserError for a wish that can't be granted.
+    """
     if not NAME.fullmatch(wish.name) or not 0 <= wish.instance < MAX_INSTANCES:
         raise UserError(f"'{wish.name}' with number {wish.instance} is no process that this deputy could name.")
     command = commands.get(wish.command)
     if command is None:
         raise UserError(f"'{wish.command}' is not in this deputy's command list, which has: {', '.join(commands)}.")
     words = command.fill({**values, "name": wish.name, "id": str(wish.instance)})
-    return Launch(tuple(words), command.folder, tuple(command.environment.items()), wish.command, tuple(wish.depends), _options(wish),
-                  run, generation)
+    depends = tuple(qualify(list_name, name) for name in wish.depends)
+    return Launch(tuple(words), command.folder, tuple(command.environment.items()), wish.command, depends, _options(wish), run, generation)
 
 
 def _options(wish: procman_wish_t) -> RunOptions:
