@@ -24,11 +24,11 @@ PROCESS_LIST = ROOT / "procman" / "local.pmd"
 
 # A process that has not said by then that it runs never will; LCM's own self-test may take 10 s.
 START_TIMEOUT_S = 20.0
-# A stored source without a new pose for this long is stuck; repairs and late tiles take a few seconds, the
-# adjustment of a large map a minute.
+# A stored source without a new pose for this long is stuck, unless somebody works on the map: repairs and late tiles take
+# a few seconds, but the adjustment of a large map, which frames may wait for and the end does, takes minutes.
 STALL_TIMEOUT_S = 120.0
-# When the last frame has its pose, the map may be bent and adjusted as a whole once more; it takes as long as the map is large.
-ENDING_TIMEOUT_S = 900.0
+ADJUSTMENT_TIMEOUT_S = 900.0
+MAP_STAGES = ("mapper", "loop_closer", "global_adjuster")
 # After Ctrl-C the frames on their way get this long to be tracked.
 DRAIN_TIMEOUT_S = 3.0
 LISTEN_MS = 50
@@ -78,6 +78,7 @@ class Launcher:
         self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns)
         self._interrupt = Interrupt()
         self._num_warnings_said = 0
+        self._map_busy_at = 0.0  # monotonic seconds
 
     def run(self) -> int:
         """The exit status. All processes have ended when it returns or raises."""
@@ -161,12 +162,15 @@ class Launcher:
 
     def _check_stall(self) -> None:
         progress = self._bus.progress
-        since = max(progress.last_pose_at or 0.0, progress.started_at)
-        has_all_poses = progress.num_frames is not None and progress.num_poses >= progress.num_frames
-        if self._source.is_live or time.monotonic() - since < (ENDING_TIMEOUT_S if has_all_poses else STALL_TIMEOUT_S):
+        now = time.monotonic()
+        if self._deputy.is_busy(MAP_STAGES):
+            self._map_busy_at = now
+        waited_s = now - max(progress.last_pose_at or 0.0, progress.started_at)
+        idle_s = min(waited_s, now - self._map_busy_at)
+        if self._source.is_live or (idle_s < STALL_TIMEOUT_S and waited_s < ADJUSTMENT_TIMEOUT_S):
             return
         errors = [f"{report.name}: {report.last_error}" for report in progress.stages.values() if report.last_error]
-        raise RunFailed(f"no pose for {STALL_TIMEOUT_S:.0f} s after {progress.num_poses} frames; "
+        raise RunFailed(f"no pose for {waited_s:.0f} s after {progress.num_poses} frames; "
                         + (errors[-1] if errors else f"the logs are in {self._folder / 'stages'}."))
 
     def _summarize(self, wall_s: float, ended: str) -> dict:

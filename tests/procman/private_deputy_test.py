@@ -26,6 +26,7 @@ cmd "deaf"     { exec = "sh -c 'trap \\"\\" TERM; echo what; while true; do slee
 cmd "oneshot"  { exec = "sh -c 'echo all is done'"; }
 cmd "refuser"  { exec = "sh -c 'echo tessera-camera: there is no folder X >&2; exit 2'"; }
 cmd "faulty"   { exec = "sh -c 'echo the disk is missing; exit 3'"; }
+cmd "busy"     { exec = "sh -c 'while true; do true; done'"; }
 cmd "absent"   { exec = "/no/such/program"; }
 '''
 STARTED = {"ready": "started", "auto_respawn": "never"}
@@ -54,6 +55,12 @@ def make_deputy(tmp_path):
 
 def step_until(deputy: PrivateDeputy, condition, what: str) -> None:
     wait_for(lambda: (deputy.step(), condition())[1], what)
+
+
+def test_tells_who_is_at_work(make_deputy):
+    deputy = make_deputy(process("sleeper"), process("busy"))
+    step_until(deputy, lambda: deputy.is_busy(["sleeper", "busy"]), "one of them is busy")
+    assert deputy.is_busy(["busy"]) and not deputy.is_busy(["sleeper"]) and not deputy.is_busy([])
 
 
 def pid_of(deputy: PrivateDeputy, name: str) -> int:

@@ -24,6 +24,8 @@ from tessera_cli.types import procman_process_t as states
 
 COMMANDS = ROOT / "procman" / "commands.pmd"
 END_TURN_S = 0.01
+# Of one core; waiting stages need one or two.
+BUSY_PERCENT = 10.0
 # A stage names itself first; who quotes its words has named it already.
 OWN_NAME = re.compile(r"^tessera-[a-z-]+: ")
 
@@ -69,6 +71,10 @@ class PrivateDeputy:
     def is_over(self) -> bool:
         """Nothing runs, and nothing will."""
         return all(member.child is None and member.state in (states.ENDED, states.STOPPED) for member in self.processes)
+
+    def is_busy(self, names: Iterable[str]) -> bool:
+        """Whether one of them uses processor time: a stage in a long step says nothing meanwhile."""
+        return any(member.child and member.usage.cpu_percent > BUSY_PERCENT for member in self.processes if member.name in names)
 
     def owns(self, pid: int) -> bool:
         return pid in self._pids
