@@ -1,7 +1,10 @@
 """Several lists on the same deputies: each is started, replaced, ended and resumed alone."""
 
-from deputies import Node, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+from deputies import FIRST_PORT, Node, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+from tessera_cli.lan.list_view import ListView
 from tessera_cli.lan.tree import marked
+from tessera_cli.settings import GROUP
+from tessera_cli.types import pose_t, stage_status_t
 
 COMMANDS = '''
 cmd "sleeper"   { exec = "sleep 1000"; }
@@ -137,3 +140,22 @@ def test_counts_of_the_command_line_replace_those_of_the_list(make_node):
     assert up.returncode == 2 and "no cmd \"walker\"" in up.stderr
     up = node.up(text, "--count", "talker=many", name="counted")
     assert up.returncode == 2 and "not CMD=NUMBER" in up.stderr
+
+
+def test_who_begins_to_watch_late_knows_how_much_is_left():
+    view = ListView(f"udpm://{GROUP}:{FIRST_PORT}?ttl=0", "A_")
+    camera = stage_status_t()
+    camera.name, camera.value_names, camera.values, camera.num_values = "camera", ["num_frames"], [120.0], 1
+    view.bus.publish("A_STATUS", camera.encode())
+    for frame in range(100, 120):
+        pose = pose_t()
+        pose.header, pose.frame, pose.state = view.bus.header("A_POSE"), frame, pose_t.TRACKED
+        pose.header.publisher = "tracker"
+        view.bus.publish("A_POSE", pose.encode())
+
+    def has_heard_all() -> bool:
+        view.bus.handle_waiting()
+        return view.progress.last_frame == 119
+
+    wait_for(has_heard_all, "the poses")
+    assert view.in_words().startswith("frame 120 of 120, ") and "0:00 left" in view.in_words()

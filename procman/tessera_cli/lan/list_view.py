@@ -26,6 +26,8 @@ class ListView:
         if pose.header.publisher == "tracker" and pose.state in TRACKING_STATES:
             if pose.frame <= self.progress.last_frame:  # another run has begun
                 self.progress = Progress(num_frames=self.progress.num_frames)
+            if self.progress.num_poses == 0:
+                self.progress.num_poses = pose.frame  # those before it went by unheard
             self.progress.add_pose(pose.frame, TRACKING_STATES[pose.state])
 
     def in_words(self) -> str:
