@@ -32,7 +32,8 @@ TileFeatures Extractor::Extract(const TileJob& job) {
   BuildPyramids(job);
   DetectCandidates(job);
 
-  TileFeatures features{.frame = job.frame,
+  TileFeatures features{.run = job.run,
+                        .frame = job.frame,
                         .previous_frame = job.previous_frame,
                         .utime_us = job.utime_us,
                         .arrival_us = job.arrival_us,

@@ -63,6 +63,7 @@ struct FeatureFrame {
 
 // One unit of work: detect and describe the candidates of one tile, over a range of pyramid levels.
 struct TileJob {
+  int64_t run = 0;  // start of the reassembler that awaits the answer: copied into it, so that it is known as this run's
   FrameId frame;
   FrameId previous_frame;  // the frame before it that was not dropped; invalid: it is the first
   int64_t utime_us = 0;
@@ -103,6 +104,7 @@ struct Candidate {
 
 // The answer to a TileJob: candidates[i] belongs to descriptors[i].
 struct TileFeatures {
+  int64_t run = 0;  // as in TileJob
   FrameId frame;
   FrameId previous_frame;  // as in TileJob: the order in which frames are released
   int64_t utime_us = 0;

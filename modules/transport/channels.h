@@ -41,6 +41,7 @@ inline const Channel kStatusChannel{"STATUS", BusKind::kMain};
 inline const Channel kHeartbeatChannel{"HEARTBEAT", BusKind::kMain};
 inline const Channel kRepairChannel{"REPAIR", BusKind::kMain};
 
+inline constexpr int kMaxRobots = 64;        // that share one extractor
 inline constexpr int kMaxExtractors = 1024;  // ids are 0 .. kMaxExtractors - 1: each has a port of its own
 
 inline Channel TileChannel(int extractor) {

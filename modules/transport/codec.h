@@ -35,7 +35,8 @@ inline constexpr Delivery kDelivery = Delivery::kFromFirst;
 // Jobs given to an extractor that died are given to others: its successor must not do them again.
 template <>
 inline constexpr Delivery kDelivery<TileJob> = Delivery::kFromNow;
-// What a reassembler that was started again lacks is extracted again, which is less than all that extractors still have.
+// What a reassembler that was started again lacks is extracted again, which is less than all that extractors still have;
+// one of a pool has answers to earlier runs, too.
 template <>
 inline constexpr Delivery kDelivery<TileFeatures> = Delivery::kFromNow;
 // The map has a way of its own to catch up (MapFollower), which spares a late listener, and all others on the bus, the

@@ -20,6 +20,7 @@ constexpr int32_t kMaxCandidates = 1 << 20;
 // What jobs and their answers have in common.
 template <class Message, class Value>
 void SetTile(const Value& value, Message* message) {
+  message->run = value.run;
   message->frame = value.frame.value;
   message->previous_frame = value.previous_frame.value;
   message->utime = value.utime_us;
@@ -32,6 +33,7 @@ void SetTile(const Value& value, Message* message) {
 
 template <class Message, class Value>
 std::string GetTile(const Message& message, Value* value) {
+  value->run = message.run;
   value->frame.value = message.frame;
   value->previous_frame.value = message.previous_frame;
   value->utime_us = message.utime;
@@ -39,6 +41,7 @@ std::string GetTile(const Message& message, Value* value) {
   value->tile = message.tile;
   value->num_tiles = message.num_tiles;
   return FirstProblem({CheckFrame(message.frame), CheckTimes(message.utime, message.arrival),
+                       CheckTimes(message.run, 0),
                        Require(message.previous_frame >= -1 && message.previous_frame < message.frame,
                                "the frame before it does not have a lower number"),
                        Require(message.num_tiles >= 1 && message.num_tiles <= kMaxTiles && message.tile >= 0 &&
@@ -49,7 +52,7 @@ std::string GetTile(const Message& message, Value* value) {
 
 template <class Message, class Value>
 bool IsSameTile(const Message& message, const Value& value) {
-  return message.frame == value.frame.value && message.tile == value.tile && message.num_tiles == value.num_tiles;
+  return message.run == value.run && message.frame == value.frame.value && message.tile == value.tile && message.num_tiles == value.num_tiles;
 }
 
 }  // namespace
@@ -250,15 +253,18 @@ struct Codec<ExtractorReady> {
     message->extractor = ready.extractor;
     message->extractor_epoch_us = ready.epoch_us;
     message->num_jobs_done = ready.num_jobs_done;
+    message->num_robots = ready.num_robots;
     emit(*message);
   }
   static std::string Join(const Message& message, ExtractorReady* ready) {
     *ready = {.extractor = message.extractor,
               .epoch_us = message.extractor_epoch_us,
-              .num_jobs_done = message.num_jobs_done};
+              .num_jobs_done = message.num_jobs_done,
+              .num_robots = message.num_robots};
     return FirstProblem({CheckTimes(ready->epoch_us, 0),
-                         Require(ready->extractor >= 0 && ready->extractor < kMaxExtractors && ready->num_jobs_done >= 0,
-                                 "its extractor's id or count is out of range")});
+                         Require(ready->extractor >= 0 && ready->extractor < kMaxExtractors && ready->num_jobs_done >= 0 &&
+                                     ready->num_robots >= 1 && ready->num_robots <= kMaxRobots,
+                                 "its extractor's id or a count is out of range")});
   }
 };
 TESSERA_CODEC(ExtractorReady);

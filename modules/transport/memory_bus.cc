@@ -89,8 +89,7 @@ void MemoryBus::Impl::Step() {
 int64_t MemoryBus::Impl::NumValues() const {
   int64_t num_values = 0;
   for (const Member& member : members) {
-    const StageFigures& figures = member.context->impl().figures_;
-    num_values += figures.num_received + figures.num_published;
+    num_values += member.context->impl().num_values();
   }
   return num_values;
 }
@@ -109,10 +108,12 @@ MemoryBus::~MemoryBus() {
   for (Impl::Member& member : impl_->members) member.stage.reset();
 }
 
-StageContext& MemoryBus::AddContext(const std::string& name, int id) {
+StageContext& MemoryBus::AddContext(const std::string& name, int id, const std::vector<std::string>& assignments) {
   Impl* impl = impl_.get();
+  Settings settings = impl->settings;
+  for (const std::string& assignment : assignments) settings.Override(assignment);
   StageContext::Impl::Setup setup{
-      .settings = impl->settings,
+      .settings = std::move(settings),
       .identity = {.name = name,
                    .id = id,
                    .epoch_us = impl->clock->WallUs() + ++impl->num_started,
@@ -128,9 +129,9 @@ StageContext& MemoryBus::AddContext(const std::string& name, int id) {
 }
 
 void MemoryBus::Keep(const std::string& name, std::shared_ptr<void> stage) {
-  for (Impl::Member& member : impl_->members) {
-    if (member.context->name() == name) member.stage = stage;
-  }
+  const auto newest = std::find_if(impl_->members.rbegin(), impl_->members.rend(),
+                                   [&](const Impl::Member& member) { return member.context->name() == name; });
+  newest->stage = std::move(stage);
 }
 
 void MemoryBus::Kill(const std::string& name) {

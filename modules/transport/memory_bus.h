@@ -27,18 +27,19 @@ class MemoryBus {
   MemoryBus(const MemoryBus&) = delete;
   MemoryBus& operator=(const MemoryBus&) = delete;
 
-  // A context for the test itself, or for a stage that is made by hand.
-  StageContext& AddContext(const std::string& name, int id = 0);
+  // A context for the test itself, or for a stage that is made by hand. `assignments`: settings of its own,
+  // section.key=value.
+  StageContext& AddContext(const std::string& name, int id = 0, const std::vector<std::string>& assignments = {});
 
   // Starts a stage. What its constructor throws, this throws.
   template <class Stage>
-  Stage& Start(const std::string& name, int id = 0) {
-    auto stage = std::make_shared<Stage>(AddContext(name, id));
+  Stage& Start(const std::string& name, int id = 0, const std::vector<std::string>& assignments = {}) {
+    auto stage = std::make_shared<Stage>(AddContext(name, id, assignments));
     Stage& reference = *stage;
     Keep(name, std::move(stage));
     return reference;
   }
-  // Ends a stage as SIGKILL would: it says nothing more. It may be started again under the same name.
+  // Ends a stage as SIGKILL would: it says nothing more, under no prefix. It may be started again under the same name.
   void Kill(const std::string& name);
 
   // Messages for which `lose` returns true are lost on their way (to everybody).

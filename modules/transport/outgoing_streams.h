@@ -36,6 +36,9 @@ class OutgoingStreams {
   // Sends the messages of one value. False if the operating system refused one (it will be asked for again).
   bool Send(int stream, std::vector<Bytes> messages, std::optional<int64_t> source_us);
 
+  // What was sent so far is not kept any longer.
+  void Forget(int stream) { streams_[static_cast<size_t>(stream)].history.Clear(); }
+
   // Sends again what is asked for and still there.
   void Resend(const RepairRequest& request, int64_t now_us);
 

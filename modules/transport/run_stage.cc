@@ -157,8 +157,7 @@ int Live(const std::string& program, const Arguments& arguments,
   std::shared_ptr<void> stage;
   if (!engine.stopped_) {
     stage = make_stage(context);
-    engine.state_ = StageState::kRunning;
-    engine.SendStatus(false);  // who waits for it to run need not wait for the next regular one
+    engine.BeginToRun();  // who waits for it to run need not wait for the next regular one
     RunUntilStopped(context);
     if (engine.incoming_.hears_all()) CompleteRecording(engine);
   }

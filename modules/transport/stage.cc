@@ -23,6 +23,11 @@ void Publisher<Value>::Publish(const Value& value) const {
 }
 
 template <class Value>
+void Publisher<Value>::Forget() const {
+  context_->impl().outgoing_.Forget(stream_);
+}
+
+template <class Value>
 Publisher<Value> StageContext::Advertise(const Channel& channel, Publishers publishers) {
   Publisher<Value> publisher;
   publisher.context_ = this;
@@ -55,6 +60,10 @@ void StageContext::Every(std::chrono::milliseconds period, std::function<void()>
 }
 
 void StageContext::WhenIdle(std::function<bool()> task) { impl_->idle_tasks_.push_back(std::move(task)); }
+
+StageContext& StageContext::JoinRobot(const std::string& channel_prefix) { return impl_->Join(channel_prefix); }
+
+bool StageContext::fell_silent() const { return impl_->stopped_; }
 
 void StageContext::Finish() {
   if (finished()) return;

@@ -41,6 +41,8 @@ class Publisher {
  public:
   Publisher() = default;
   void Publish(const Value& value) const;
+  // What was published so far interests nobody any more: it is not kept for repair.
+  void Forget() const;
 
  private:
   friend class StageContext;
@@ -87,6 +89,13 @@ class StageContext {
   // Runs `task` whenever no message waits: again at once while it returns true, else after the next message or timer.
   // The main loop of a stage that makes its own work, such as the camera.
   void WhenIdle(std::function<bool()> task);
+
+  // This process under another robot's channel prefix: channels, streams, STATUS, HEARTBEAT and REPAIR of its own, on the
+  // same buses, thread and clock. It lives as long as this context. If another process of this name is there already, it
+  // falls silent, which is an error here, and this context goes on: so it had better listen for two heartbeats before it
+  // advertises. Throws InputError if the prefix can't be one.
+  StageContext& JoinRobot(const std::string& channel_prefix);
+  bool fell_silent() const;
 
   // The stage has sent its last value. It stays to repair what others missed until it is told to stop (SIGTERM,
   // SIGINT, end of a memq test), and says `kFinished` in its status.

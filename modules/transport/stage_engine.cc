@@ -38,7 +38,10 @@ StageContext::Impl::Impl(Setup setup)
 }
 
 std::shared_ptr<Bus> StageContext::Impl::BusOf(const Channel& channel) {
-  const std::string url = UrlOf(channel, settings_);
+  return BusAt(UrlOf(channel, settings_));
+}
+
+std::shared_ptr<Bus> StageContext::Impl::BusAt(const std::string& url) {
   std::shared_ptr<Bus>& bus = buses_[url];
   if (!bus) bus = open_bus_(url);
   return bus;
@@ -68,6 +71,19 @@ int StageContext::Impl::Advertise(const Channel& channel, Delivery delivery, boo
   // Who begins to listen now must know that the stream's first messages are meant for him.
   if (delivery == Delivery::kFromNow) SendHeartbeats();
   return stream;
+}
+
+StageContext& StageContext::Impl::Join(const std::string& channel_prefix) {
+  Settings settings = settings_;
+  settings.Override("bus.channel_prefix=" + channel_prefix);
+  Setup setup{.settings = std::move(settings),
+              .identity = identity_,
+              .clock = clock_,
+              .open_bus = [this](const std::string& url) { return BusAt(url); },
+              .log = log_};
+  others_.push_back(std::make_unique<StageContext>(std::make_unique<Impl>(std::move(setup))));
+  others_.back()->impl().state_ = state_;
+  return *others_.back();
 }
 
 void StageContext::Impl::SubscribeAll(const IncomingStreams::RawHandler& handler) {
@@ -125,6 +141,9 @@ void StageContext::Impl::SendStatus(bool is_final) {
   status_due_us_ = now_us + kStatusPeriodUs;
   if (!talks_) return;
   const StageState state = exit_status_ != 0 ? StageState::kFailed : state_;
+  if (is_final) {
+    for (const auto& other : others_) other->impl().SendStatus(true);
+  }
   Send(status_stream_,
        figures_.MakeStatus(state, incoming_.counts(), incoming_.num_undecodable(), now_us, is_final));
 }
@@ -189,31 +208,71 @@ bool StageContext::Impl::RunIdleTasks() {
   return again;
 }
 
-bool StageContext::Impl::Step() {
-  const bool some_wait = HandleMessages();
-  RunTimers();
-  if (some_wait || stopped_) return !stopped_;
+void StageContext::Impl::AskForRepairs() {
   for (const RepairRequest& request : incoming_.Poll()) {
     Send(repair_stream_, request);
   }
-  return RunIdleTasks();
+}
+
+// One robot's namesake of this process is no reason to fail the others.
+void StageContext::Impl::PartFromFailed() {
+  for (const auto& other : others_) {
+    Impl& engine = other->impl();
+    if (!engine.stopped_ || engine.is_silent_) continue;
+    engine.Silence();
+    ReportError("under the channel prefix `" + engine.stream_settings_.channel_prefix + "`: " + engine.failure_);
+  }
+}
+
+bool StageContext::Impl::Step() {
+  const bool some_wait = HandleMessages();  // of all prefixes: the buses are the same
+  RunTimers();
+  for (const auto& other : others_) {
+    if (!other->impl().is_silent_) other->impl().RunTimers();
+  }
+  PartFromFailed();
+  if (some_wait || stopped_) return !stopped_;
+  AskForRepairs();
+  for (const auto& other : others_) {
+    if (!other->impl().is_silent_) other->impl().AskForRepairs();
+  }
+  bool again = RunIdleTasks();
+  for (const auto& other : others_) again |= !other->impl().is_silent_ && other->impl().RunIdleTasks();
+  return again;
 }
 
 int64_t StageContext::Impl::NextDueUs() const {
   int64_t due_us = std::min({heartbeat_due_us_, soon_due_us_, status_due_us_});
   for (const Timer& timer : timers_) due_us = std::min(due_us, timer.due_us);
+  for (const auto& other : others_) {
+    if (!other->impl().is_silent_) due_us = std::min(due_us, other->impl().NextDueUs());
+  }
   return std::min(due_us, incoming_.next_poll_us().value_or(INT64_MAX));
 }
 
+void StageContext::Impl::BeginToRun() {
+  state_ = StageState::kRunning;
+  SendStatus(false);
+  for (const auto& other : others_) other->impl().BeginToRun();
+}
+
+int64_t StageContext::Impl::num_values() const {
+  int64_t num_values = figures_.num_received + figures_.num_published;
+  for (const auto& other : others_) num_values += other->impl().num_values();
+  return num_values;
+}
+
 void StageContext::Impl::Silence() {
-  stopped_ = true;
+  stopped_ = is_silent_ = true;
   incoming_.Close();
+  for (const auto& other : others_) other->impl().Silence();
 }
 
 void StageContext::Impl::ForgetStage() {
   stage_is_gone_ = true;
   timers_.clear();
   idle_tasks_.clear();
+  for (const auto& other : others_) other->impl().ForgetStage();
 }
 
 }  // namespace tessera

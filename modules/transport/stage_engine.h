@@ -42,6 +42,7 @@ struct StageContext::Impl {
   template <class Value>
   void Subscribe(const Channel& channel, std::function<void(const Value&, const MessageHeader&, int64_t arrival_us)> handler);
   void SubscribeAll(const IncomingStreams::RawHandler& handler);
+  StageContext& Join(const std::string& channel_prefix);
   void ReportError(const std::string& sentence);
   void Fail(const std::string& sentence, int exit_status);
   // Runs `call`; reports what it throws.
@@ -52,6 +53,10 @@ struct StageContext::Impl {
   // idle tasks. False if there is nothing left to do before something arrives or NextDueUs().
   bool Step();
   int64_t NextDueUs() const;
+  // The stage stands: says so.
+  void BeginToRun();
+  // Values sent and received, but for what stages say of themselves; under all prefixes.
+  int64_t num_values() const;
   std::vector<std::shared_ptr<Bus>> buses() const;
   void SendHeartbeats();
   void SendStatus(bool is_final);
@@ -86,11 +91,14 @@ struct StageContext::Impl {
   std::string failure_;
 
  private:
+  std::shared_ptr<Bus> BusAt(const std::string& url);
   void OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header);
   void ListenToExtractors(const Heartbeat& heartbeat);
   bool HandleMessages();
   void RunTimers();
+  void AskForRepairs();
   bool RunIdleTasks();
+  void PartFromFailed();
 
   bool talks_ = false;  // the main bus has listeners
   int heartbeat_stream_ = -1;
@@ -102,6 +110,8 @@ struct StageContext::Impl {
   int64_t status_due_us_ = 0;
   int64_t num_errors_ = 0;        // reported within the second that began at
   int64_t errors_since_us_ = 0;
+  bool is_silent_ = false;
+  std::vector<std::unique_ptr<StageContext>> others_;  // this process under other prefixes; driven by this one
 };
 
 }  // namespace tessera

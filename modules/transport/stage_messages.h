@@ -10,11 +10,12 @@
 
 namespace tessera {
 
-// An extractor says that it lives and how much it has left to do: at start, after each job, and twice a second.
+// An extractor says that it lives: at start, and twice a second.
 struct ExtractorReady {
   int32_t extractor = 0;      // its id, the n of TILE_<n>
   int64_t epoch_us = 0;       // when it started: a changed epoch means that its jobs died with its predecessor
-  int64_t num_jobs_done = 0;  // since it started
+  int64_t num_jobs_done = 0;  // since it started, for all robots
+  int32_t num_robots = 1;     // that have given it work of late: each gets its share of it
 };
 
 // The reassembler has the candidates of these tiles of one frame: nobody needs to work on them again, as long as this

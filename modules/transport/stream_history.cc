@@ -15,6 +15,11 @@ const Bytes& StreamHistory::Append(Bytes message) {
   return entries_.back().message;
 }
 
+void StreamHistory::Clear() {
+  entries_.clear();
+  num_bytes_ = 0;
+}
+
 const Bytes* StreamHistory::Resend(int64_t sequence, int64_t now_us, int64_t pause_us) {
   if (sequence < first() || sequence >= next_) {
     return nullptr;

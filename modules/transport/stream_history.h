@@ -17,6 +17,9 @@ class StreamHistory {
   // Keeps the message, which is number next().
   const Bytes& Append(Bytes message);
 
+  // Keeps none of them any longer.
+  void Clear();
+
   int64_t first() const { return next_ - static_cast<int64_t>(entries_.size()); }  // oldest that is kept
   int64_t next() const { return next_; }
 

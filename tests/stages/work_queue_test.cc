@@ -115,6 +115,20 @@ TEST(WorkQueue, LateJobsGoToSomebodyElse) {
   EXPECT_TRUE(queue.idle());
 }
 
+TEST(WorkQueue, AnExtractorThatWorksForSeveralRobotsIsGivenMoreTime) {
+  WorkQueue queue(TwoByTwo());
+  queue.AddFrame(Frame(0), kCalibration, 0);
+  queue.HearExtractor(0, 1, 0, 3);
+  GiveAll(queue, 0);
+  queue.HearExtractor(1, 1, 5 * kSecondUs);
+  queue.HearExtractor(0, 1, 5 * kSecondUs, 3);
+  queue.CheckExtractors(5 * kSecondUs);
+  EXPECT_EQ(queue.num_given_again(), 0);
+  queue.HearExtractor(0, 1, 7 * kSecondUs, 3);
+  queue.CheckExtractors(7 * kSecondUs);
+  EXPECT_EQ(queue.num_given_again(), 2);
+}
+
 TEST(WorkQueue, BoundsFramesInFlightAndDropsWhenFull) {
   WorkQueueOptions options;
   options.max_frames_in_flight = 2;

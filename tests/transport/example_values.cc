@@ -108,6 +108,7 @@ TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
   const int width = size == 0 ? 8 : Draw(generator, 300, 900);
   const int height = size == 0 ? 8 : Draw(generator, 60, 200);
   TileJob job;
+  job.run = 1'700'000'000'000'000 + Draw(generator, 0, 999);
   job.frame = {Draw(generator, 1, 9999)};
   job.previous_frame = {job.frame.value - 1};
   job.utime_us = Draw(generator, 0, 1 << 30);
@@ -138,6 +139,7 @@ bool AreSame(const TileJob& a, const TileJob& b) {
 template <>
 TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   TileFeatures features;
+  features.run = 1'700'000'000'000'000 + Draw(generator, 0, 999);
   features.frame = {Draw(generator, 1, 9999)};
   features.previous_frame = {Draw(generator, -1, 0)};
   features.utime_us = Draw(generator, 0, 1 << 30);
@@ -178,11 +180,13 @@ bool AreSame(const TileAck& a, const TileAck& b) {
 
 template <>
 ExtractorReady DrawValue<ExtractorReady>(std::mt19937& generator, int) {
-  return {.extractor = Draw(generator, 0, 99), .epoch_us = 1'700'000'000'000'000, .num_jobs_done = Draw(generator, 0, 99)};
+  return {.extractor = Draw(generator, 0, 99), .epoch_us = 1'700'000'000'000'000, .num_jobs_done = Draw(generator, 0, 99),
+          .num_robots = Draw(generator, 1, 9)};
 }
 template <>
 bool AreSame(const ExtractorReady& a, const ExtractorReady& b) {
-  return a.extractor == b.extractor && a.epoch_us == b.epoch_us && a.num_jobs_done == b.num_jobs_done;
+  return a.extractor == b.extractor && a.epoch_us == b.epoch_us && a.num_jobs_done == b.num_jobs_done &&
+         a.num_robots == b.num_robots;
 }
 
 template <>

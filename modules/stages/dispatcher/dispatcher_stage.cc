@@ -44,7 +44,7 @@ DispatcherStage::DispatcherStage(StageContext& context)
   context.Subscribe<CameraFrame>(
       kCameraChannel, [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
   context.Subscribe<ExtractorReady>(kExtractorReadyChannel, [this](const ExtractorReady& ready, const MessageInfo&) {
-    queue_.HearExtractor(ready.extractor, ready.epoch_us, context_.now_us());
+    queue_.HearExtractor(ready.extractor, ready.epoch_us, context_.now_us(), ready.num_robots);
     GiveWork();
   });
   context.Subscribe<TileAck>(kTileAckChannel,
@@ -129,6 +129,7 @@ void DispatcherStage::OnAck(const TileAck& ack, const MessageInfo& info) {
     queue_.GiveAllAgain();
   }
   reassembler_epoch_us_ = info.epoch_us;
+  queue_.SetRun(info.epoch_us);
   queue_.Acknowledge(ack.frame, ack.tiles);
   GiveWork();
 }
@@ -158,9 +159,9 @@ void DispatcherStage::QueueFrame(Arrived arrived) {
   }
 }
 
-// Gives out jobs while there are any and somebody is free.
+// Gives out jobs while there are any and somebody is free, once it is known which reassembler awaits the answers.
 void DispatcherStage::GiveWork() {
-  while (queue_.CanGive()) {
+  while (reassembler_epoch_us_ && queue_.CanGive()) {
     const StepTimer timer(context_);
     const auto [extractor, job] = queue_.GiveNext(context_.now_us());
     if (!tiles_.contains(extractor)) {
@@ -182,6 +183,11 @@ void DispatcherStage::Watch() {
     context_.ReportError("no extractor answers and frames are waiting: start one (tessera-extractor --id 0)");
   }
   warned_no_extractor_ = stuck;
+  const bool is_unheard = !reassembler_epoch_us_ && !queue_.idle();
+  if (is_unheard && !warned_no_reassembler_) {
+    context_.ReportError("frames are waiting for the reassembler to say that it is there: start tessera-reassembler");
+  }
+  warned_no_reassembler_ = is_unheard;
 }
 
 void DispatcherStage::FinishIfDone() {

@@ -35,7 +35,7 @@ bool WorkQueue::AddFrame(CameraFrame frame, const CameraCalibration& calibration
   return true;
 }
 
-void WorkQueue::HearExtractor(int extractor, int64_t epoch_us, int64_t now_us) {
+void WorkQueue::HearExtractor(int extractor, int64_t epoch_us, int64_t now_us, int32_t num_robots) {
   Worker& worker = extractors_[extractor];
   if (worker.epoch_us != epoch_us) {
     // A new process under the old name: what its predecessor had died with it.
@@ -44,6 +44,7 @@ void WorkQueue::HearExtractor(int extractor, int64_t epoch_us, int64_t now_us) {
     worker.free_since = turn_;
   }
   worker.heard_us = now_us;
+  worker.num_robots = num_robots;
 }
 
 void WorkQueue::Acknowledge(FrameId frame, const std::vector<int32_t>& tiles) {
@@ -102,7 +103,8 @@ WorkQueue::Assignment WorkQueue::GiveNext(int64_t now_us) {
   }
   const JobKey key = to_give_.front();
   to_give_.pop_front();
-  const Job& job = jobs_.at(key);
+  Job& job = jobs_.at(key);
+  job.job.run = run_;
   const int extractor = FreeExtractor(job.avoid);
   extractors_.at(extractor).given_us[key] = now_us;
   return {extractor, &job.job};
@@ -118,7 +120,7 @@ void WorkQueue::CheckExtractors(int64_t now_us) {
     }
     // Late jobs: the worker may still answer, but somebody else tries too.
     const bool is_late = std::any_of(worker.given_us.begin(), worker.given_us.end(), [&](const auto& given) {
-      return now_us - given.second > options_.late_us;
+      return now_us - given.second > options_.late_us * worker.num_robots;
     });
     if (is_late) {
       TakeBack(worker, extractor);

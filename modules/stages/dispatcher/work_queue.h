@@ -26,7 +26,8 @@ struct WorkQueueOptions {
   int max_queued_frames = 32;     // frames that wait; when full, a new one is dropped
   int max_frames_in_flight = 6;   // frames given out and not yet tracked: bounds every queue downstream
   int jobs_per_extractor = 2;     // one to work on, one on its way
-  int64_t late_us = 2'000'000;    // a job without an answer for this long is given to another
+  // A job without an answer for this long is given to another; for n times as long, if the extractor works for n robots.
+  int64_t late_us = 2'000'000;
   int64_t silent_us = 1'500'000;  // an extractor that says nothing for this long is dead
 
   // Empty if all is well, else one sentence.
@@ -42,8 +43,10 @@ class WorkQueue {
   bool AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us, bool must_keep = false);
   // A frame has come that was tracked before this queue was made.
   void SkipFrame(FrameId frame) { last_frame_ = frame; }
-  // An extractor says that it lives (`epoch_us`: since when).
-  void HearExtractor(int extractor, int64_t epoch_us, int64_t now_us);
+  // Jobs that are given from now on are of this run.
+  void SetRun(int64_t run) { run_ = run; }
+  // An extractor says that it lives (`epoch_us`: since when), and how many robots share it.
+  void HearExtractor(int extractor, int64_t epoch_us, int64_t now_us, int32_t num_robots = 1);
   // The reassembler has these tiles.
   void Acknowledge(FrameId frame, const std::vector<int32_t>& tiles);
   // The reassembler lost all that it has acknowledged.
@@ -91,6 +94,7 @@ class WorkQueue {
   struct Worker {
     int64_t epoch_us = 0;
     int64_t heard_us = 0;
+    int32_t num_robots = 1;              // that share it
     int64_t free_since = 0;              // turn at which its last job ended: the queue of free extractors
     std::map<JobKey, int64_t> given_us;  // its jobs, and when it got them
   };
@@ -108,6 +112,7 @@ class WorkQueue {
   std::set<FrameId> untracked_;     // frames cut and not yet tracked
   std::map<int, Worker> extractors_;
   FrameId last_frame_;
+  int64_t run_ = 0;
   int64_t turn_ = 0;  // counts ended jobs
   int64_t num_given_again_ = 0;
 };

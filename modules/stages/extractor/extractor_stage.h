@@ -1,7 +1,13 @@
-// Wiring of an extractor: one job in, its candidates out.
+// Wiring of an extractor: jobs in, their candidates out, for one robot or for several in turn.
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "features/extractor.h"
+#include "geometry/camera_frame.h"
+#include "stages/extractor/fair_queue.h"
 #include "transport/stage.h"
 
 namespace tessera {
@@ -11,13 +17,32 @@ class ExtractorStage {
   explicit ExtractorStage(StageContext& context);
 
  private:
-  void OnJob(const TileJob& job);
+  struct Robot {
+    StageContext* context = nullptr;
+    std::string prefix;      // of its channels
+    bool is_served = false;  // advertised and subscribed
+    Publisher<TileFeatures> features;
+    Publisher<ExtractorReady> ready;
+    int64_t run = 0;                      // whose jobs are done
+    int64_t job_came_us = INT64_MIN / 2;  // the last one
+    int64_t work_done = 0;                // as WorkOf
+  };
+
+  void Serve(size_t robot);
+  // Begins to serve those robots of which it is known that no other process has this one's name there.
+  void ServeOthers();
+  void OnJob(size_t robot, const TileJob& job);
+  void OnEnd(size_t robot, const EndOfStream& end);
+  // Does one job. Whether more wait.
+  bool DoNextJob();
   void SayReady();
 
   StageContext& context_;
+  const bool is_pool_;  // serves robots that come and go
+  std::vector<Robot> robots_;
+  FairQueue queue_;
   Extractor extractor_;
-  Publisher<TileFeatures> features_;
-  Publisher<ExtractorReady> ready_;
+  int64_t began_us_ = 0;
   int64_t num_jobs_done_ = 0;
 };
 

@@ -22,6 +22,7 @@ ReassemblerStage::ReassemblerStage(StageContext& context)
   features_ = context.Advertise<FeatureFrame>(kFeaturesChannel);
   acks_ = context.Advertise<TileAck>(kTileAckChannel);
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  acks_.Publish({.frame = {0}, .tiles = {}});  // here I am
   context.Subscribe<TileFeatures>(kTileFeaturesChannel,
                                   [this](const TileFeatures& tile, const MessageInfo&) { OnTile(tile); });
   // One that was started again goes on behind what is tracked.
@@ -39,6 +40,11 @@ ReassemblerStage::ReassemblerStage(StageContext& context)
 }
 
 void ReassemblerStage::OnTile(const TileFeatures& tile) {
+  if (tile.run != context_.epoch_us()) {
+    // An extractor of a pool finished what an earlier run had asked of it.
+    context_.SetValue("answers_of_other_runs", static_cast<double>(++num_of_other_runs_));
+    return;
+  }
   if (const std::string problem = CheckTileFeatures(tile); !problem.empty()) {
     context_.ReportError("candidates of frame " + std::to_string(tile.frame.value) + ", tile " +
                          std::to_string(tile.tile) + " are refused: " + problem);

@@ -24,6 +24,7 @@ class ReassemblerStage {
   Publisher<TileAck> acks_;
   Publisher<EndOfStream> end_of_stream_;
   std::optional<EndOfStream> dispatcher_end_;
+  int64_t num_of_other_runs_ = 0;  // answers that were passed over
 };
 
 }  // namespace tessera
