@@ -181,6 +181,56 @@ TEST(MemoryBus, SeveralPublishersMayShareAChannelThatAllowsIt) {
   EXPECT_EQ(bus.exit_status("extractor_0") + bus.exit_status("extractor_1"), 0);
 }
 
+TEST(JoinRobot, EachPrefixHasStreamsOfItsOwn) {
+  MemoryBus bus(Defaults());
+  std::mt19937 generator(3);
+  bus.LoseMessages([&](const std::string&) { return generator() % 4 == 0; });
+  StageContext& process = bus.AddContext("dispatcher");
+  const auto own = process.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  const auto of_a = process.JoinRobot("a_").Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  std::map<std::string, std::vector<int64_t>> heard;
+  std::set<std::string> statuses;
+  for (const std::string prefix : {"", "a_", "b_"}) {
+    StageContext& listener = bus.AddContext(prefix + "listener", 0, {"bus.channel_prefix=" + prefix});
+    listener.Subscribe<EndOfStream>(kEndOfStreamChannel, [&heard, prefix](const EndOfStream& end, const MessageInfo&) {
+      heard[prefix].push_back(end.num_frames);
+    });
+    listener.Subscribe<StageStatus>(kStatusChannel, [&statuses, prefix](const StageStatus& status, const MessageInfo&) {
+      if (status.name == "dispatcher") statuses.insert(prefix);
+    });
+  }
+  for (int64_t i = 0; i < 20; ++i) {
+    own.Publish({.stage = "dispatcher", .num_frames = i});
+    of_a.Publish({.stage = "dispatcher", .num_frames = 100 + i});
+  }
+  ASSERT_TRUE(bus.RunUntil([&] { return heard[""].size() >= 20 && heard["a_"].size() >= 20 && statuses.size() >= 2; }));
+  bus.RunUntilQuiet();
+  for (int64_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(heard[""].at(static_cast<size_t>(i)), i);
+    EXPECT_EQ(heard["a_"].at(static_cast<size_t>(i)), 100 + i);
+  }
+  EXPECT_TRUE(heard["b_"].empty());
+  EXPECT_EQ(statuses, (std::set<std::string>{"", "a_"}));
+}
+
+TEST(JoinRobot, ANamesakeUnderOnePrefixSilencesOnlyThat) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("extractor_0", 0, {"bus.channel_prefix=a_"});
+  bus.RunUntilQuiet();
+  StageContext& pool = bus.AddContext("extractor_0");
+  StageContext& under_a = pool.JoinRobot("a_");
+  StageContext& under_b = pool.JoinRobot("b_");
+  std::string last_error;
+  bus.AddContext("watcher").Subscribe<StageStatus>(
+      kStatusChannel, [&](const StageStatus& status, const MessageInfo&) { last_error = status.last_error; });
+  ASSERT_TRUE(bus.RunUntil([&] { return !last_error.empty(); }));
+  EXPECT_NE(last_error.find("`a_`"), std::string::npos) << last_error;
+  EXPECT_NE(last_error.find("another process has this name already"), std::string::npos) << last_error;
+  EXPECT_TRUE(under_a.fell_silent());
+  EXPECT_FALSE(under_b.fell_silent());
+  EXPECT_FALSE(pool.fell_silent());
+}
+
 TEST(MemoryBus, AHandlerThatThrowsIsReportedAndTheStageGoesOn) {
   MemoryBus bus(Defaults());
   StageContext& stage = bus.AddContext("stage");

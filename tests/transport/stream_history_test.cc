@@ -21,5 +21,18 @@ TEST(History, KeepsTheNewestAndAnswersOnceInAWhile) {
   EXPECT_EQ(history.first(), 5);  // the newest is kept even if it alone is too large
 }
 
+TEST(History, WhatIsForgottenKeepsItsNumbers) {
+  StreamHistory history(20);
+  for (int i = 0; i < 3; ++i) history.Append(Bytes(8));
+  history.Clear();
+  EXPECT_EQ(history.first(), 3);
+  EXPECT_EQ(history.next(), 3);
+  EXPECT_EQ(history.Resend(2, 0, 5000), nullptr);
+  history.Append(Bytes(8));
+  history.Append(Bytes(8));
+  EXPECT_EQ(history.first(), 3) << "what was forgotten takes no room";
+  EXPECT_NE(history.Resend(3, 0, 5000), nullptr);
+}
+
 }  // namespace
 }  // namespace tessera

@@ -14,6 +14,8 @@ namespace {
 constexpr size_t kMaxFramesBeforeCalibration = 16;
 // After the source's end, a frame that has not come for this long won't come any more.
 constexpr int64_t kLastFrameTimeoutUs = 5'000'000;
+// So many looks after the first frame, a reassembler that has not been heard of is missed.
+constexpr int kPatience = 5;
 
 WorkQueueOptions OptionsFrom(const Settings& settings) {
   WorkQueueOptions options;
@@ -184,10 +186,10 @@ void DispatcherStage::Watch() {
   }
   warned_no_extractor_ = stuck;
   const bool is_unheard = !reassembler_epoch_us_ && !queue_.idle();
-  if (is_unheard && !warned_no_reassembler_) {
+  num_unheard_ = is_unheard ? num_unheard_ + 1 : 0;
+  if (num_unheard_ == kPatience) {
     context_.ReportError("frames are waiting for the reassembler to say that it is there: start tessera-reassembler");
   }
-  warned_no_reassembler_ = is_unheard;
 }
 
 void DispatcherStage::FinishIfDone() {

@@ -47,7 +47,7 @@ class DispatcherStage {
   int64_t num_dropped_ = 0;
   int64_t last_activity_us_ = 0;  // when the last frame came
   bool warned_no_extractor_ = false;
-  bool warned_no_reassembler_ = false;
+  int num_unheard_ = 0;  // looks in a row at frames that wait for the reassembler
 };
 
 }  // namespace tessera

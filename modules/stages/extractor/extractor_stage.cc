@@ -90,6 +90,7 @@ void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
                                std::to_string(job.tile) + " is refused: " + problem);
   }
   owner.context->SetQueue(static_cast<int64_t>(queue_.num_waiting(robot)));
+  if (robots_.size() == 1) DoNextJob();  // nobody to be fair to: as it comes
 }
 
 void ExtractorStage::OnEnd(size_t robot, const EndOfStream& end) {

@@ -22,7 +22,6 @@ ReassemblerStage::ReassemblerStage(StageContext& context)
   features_ = context.Advertise<FeatureFrame>(kFeaturesChannel);
   acks_ = context.Advertise<TileAck>(kTileAckChannel);
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  acks_.Publish({.frame = {0}, .tiles = {}});  // here I am
   context.Subscribe<TileFeatures>(kTileFeaturesChannel,
                                   [this](const TileFeatures& tile, const MessageInfo&) { OnTile(tile); });
   // One that was started again goes on behind what is tracked.
