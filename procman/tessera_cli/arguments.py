@@ -99,8 +99,9 @@ def add_source_options(parser: argparse.ArgumentParser) -> None:
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     add_source_options(parser)
-    parser.add_argument("--extractors", type=whole_number(1, 256), metavar="P", default=os.cpu_count() or 1,
-                        help="extractor processes, default: cores of this machine")
+    parser.add_argument("--extractors", type=whole_number(0, 256), metavar="P", default=os.cpu_count() or 1,
+                        help="extractor processes, default: cores of this machine; 0: those of a pool that runs (procman/pool.pmd)")
+    parser.add_argument("--prefix", metavar="TEXT", default="", help="before every channel's name, for several robots on one bus, such as a_")
     parser.add_argument("--tiles", type=tiles, metavar="LxC", default="1x1", help="lines x columns that an image is cut into, default 1x1")
     parser.add_argument("--features", type=whole_number(1, MAX_FEATURES), metavar="N", help="keypoints per image, default 2000")
     parser.add_argument("--pace", type=pace, metavar="lockstep|realtime|X",

@@ -10,7 +10,7 @@ import lcm
 
 from tessera_cli.errors import RunFailed
 from tessera_cli.progress import FAILED, STARTING, Progress, StageReport
-from tessera_cli.types import pose_t, stage_status_t
+from tessera_cli.types import heartbeat_t, pose_t, stage_status_t
 
 TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
 # Poses come in bursts, and LCM's default of 30 would drop some.
@@ -22,14 +22,16 @@ DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowErro
 
 
 class BusListener:
-    """`owns_pid` tells whether a process of this machine belongs to our stack: others' reports are not ours."""
+    """`owns_pid` tells whether a process of this machine belongs to our stack: others' reports are not ours.
+    `shares_extractors`: extractors that speak here are those of a pool, and no other stack."""
 
-    def __init__(self, url: str, channel_prefix: str, owns_pid: Callable[[int], bool]):
+    def __init__(self, url: str, channel_prefix: str, owns_pid: Callable[[int], bool], shares_extractors: bool = False):
         self.progress = Progress()
         self.foreign = ""  # a living process that was on this bus before us
         self.others_heard_at = 0.0  # monotonic seconds: the last status of a process that is not ours
         self._began_us = int(time.time() * 1e6)
         self._owns_pid = owns_pid
+        self._shares_extractors = shares_extractors
         self._channel_prefix = channel_prefix
         self._host = os.uname().nodename
         try:
@@ -49,12 +51,15 @@ class BusListener:
                 self._lcm.handle_timeout(0)
 
     def is_free(self) -> bool:
-        """Whether nobody speaks on the bus, which every stage does ten times a second."""
+        """Whether no stack speaks on the bus, which every stage does ten times a second."""
         heard = []
-        subscription = self._lcm.subscribe(self._channel_prefix + "HEARTBEAT", lambda _channel, data: heard.append(data))
+        subscription = self._lcm.subscribe(self._channel_prefix + "HEARTBEAT", lambda _channel, data: heard.append(_publisher(data)))
         self.listen(FREE_BUS_MS)
         self._lcm.unsubscribe(subscription)
-        return not heard and not self.foreign
+        return all(self._is_of_pool(name) for name in heard) and not self.foreign
+
+    def _is_of_pool(self, name: str) -> bool:
+        return self._shares_extractors and name.startswith("extractor")
 
     def _on_status(self, _channel: str, data: bytes) -> None:
         try:
@@ -70,7 +75,8 @@ class BusListener:
             self.progress.stages[report.name] = report
             if report.name == "camera" and report.values.get("num_frames", 0) > 0:
                 self.progress.num_frames = int(report.values["num_frames"])
-        elif message.host == self._host and message.stage_epoch_us < self._began_us and os.path.exists(f"/proc/{message.pid}"):
+        elif (message.host == self._host and message.stage_epoch_us < self._began_us and os.path.exists(f"/proc/{message.pid}")
+              and not self._is_of_pool(message.name)):
             self.foreign = f"{message.name}, process {message.pid}"
 
     def _on_pose(self, _channel: str, data: bytes) -> None:
@@ -80,6 +86,14 @@ class BusListener:
             return
         if message.header.publisher == "tracker" and message.state in TRACKING_STATES:
             self.progress.add_pose(message.frame, TRACKING_STATES[message.state])
+
+
+def _publisher(data: bytes) -> str:
+    """Of a heartbeat; empty if it makes no sense."""
+    try:
+        return heartbeat_t.decode(data).header.publisher
+    except DECODE_ERRORS:
+        return ""
 
 
 def _to_report(message: stage_status_t) -> StageReport:

@@ -75,7 +75,8 @@ class Launcher:
         self._source = source
         self._folder = folder
         self._deputy = deputy
-        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns)
+        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns,
+                                shares_extractors=arguments.extractors == 0)
         self._interrupt = Interrupt()
         self._num_warnings_said = 0
         self._map_busy_at = 0.0  # monotonic seconds

@@ -64,6 +64,8 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
         raise UserError("--frames has no effect on bus:, whose frames another program sends.")
     assignments = source_assignments(arguments, source) + bus_assignments(source, arguments.port)
     assignments += [f"camera.pace={pace}", f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
+    if arguments.prefix:
+        assignments.append(f"bus.channel_prefix={arguments.prefix}")
     if arguments.live:
         assignments.append("tracker.live=true")
     if source.kind == "log":

@@ -15,7 +15,7 @@ def must_refuse(finished, *words: str) -> None:
     (["run"], "SOURCE"),
     (["run", "kitti:/tmp", "--tiles", "0x3"], "--tiles"),
     (["run", "kitti:/tmp", "--tiles", "2"], "--tiles"),
-    (["run", "kitti:/tmp", "--extractors", "0"], "--extractors"),
+    (["run", "kitti:/tmp", "--extractors", "-1"], "--extractors"),
     (["run", "kitti:/tmp", "--extractors", "many"], "--extractors"),
     (["run", "kitti:/tmp", "--features", "-5"], "--features"),
     (["run", "kitti:/tmp", "--pace", "0"], "--pace"),

@@ -168,3 +168,12 @@ def test_robots_come_and_go_and_come_again(start, tasks, alone):
     assert again.result() == alone["b_"]
     once_more = start(Robot, "a, once more", "a_", *tasks["a_"]).start_all()
     assert once_more.result() == alone["a_"]
+
+
+def test_tessera_run_takes_the_extractors_of_a_pool(start, tessera, sequence, reference_run):
+    start(Pool, "pool")
+    out = tessera.next_folder().with_name("with a pool")
+    tessera.command("run", f"kitti:{sequence}", "--extractors", 0, "--prefix", "a_", "--port", PORT, "--out", out).must_end_well()
+    summary = json.loads((out / "summary.json").read_text())
+    for key in ("frames", "frames_dropped", "trajectory_sha256", "map_sha256"):
+        assert summary[key] == reference_run.summary[key], key

@@ -16,13 +16,20 @@ def write(tmp_path, text):
     return path
 
 
-@pytest.mark.parametrize("name", ["lan.pmd", "local.pmd"])
+@pytest.mark.parametrize("name", ["lan.pmd", "local.pmd", "robot.pmd"])
 def test_shipped_lists_use_commands_of_the_shipped_command_list(name):
     shipped = read_process_list(ROOT / "procman" / name)
     commands = read_command_list(ROOT / "procman" / "commands.pmd")
     assert {process.command for process in shipped.processes.values()} <= set(commands)
     assert set(shipped.processes["camera"].depends) == set(shipped.processes) - {"camera"}
     assert "run" in shipped.scripts
+
+
+def test_robots_have_no_extractors_and_their_pool_has_nothing_else():
+    pool, robot = (read_process_list(ROOT / "procman" / name) for name in ("pool.pmd", "robot.pmd"))
+    assert {process.command for process in pool.processes.values()} == {"extractor"}
+    assert "extractor" not in {process.command for process in robot.processes.values()}
+    assert pool.settings == ["extractor.robots=a_,b_"]
 
 
 def test_the_lan_list_has_extractors_on_three_nodes_and_all_else_on_the_first():
