@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <random>
+#include <set>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "core/errors.h"
 #include "transport/example_values.h"
