@@ -76,6 +76,13 @@ def frames(text: str) -> tuple[int, int]:
     return first, last
 
 
+def cmd_count(text: str) -> tuple[str, int]:
+    name, equals, number = text.partition("=")
+    if not name or not equals or not re.fullmatch(r"\d{1,3}", number):
+        raise argparse.ArgumentTypeError(f"'{text}' is not CMD=NUMBER, such as extractor=4")
+    return name, int(number)
+
+
 def assignment(text: str) -> str:
     if not re.fullmatch(r"[^=]+=.*", text, re.DOTALL):
         raise argparse.ArgumentTypeError(f"must be section.key=value, not '{text}'")
@@ -269,6 +276,8 @@ def add_sheriff_commands(commands) -> None:
     up.add_argument("file", metavar="FILE", help="a process list, such as procman/lan.pmd")
     up.add_argument("--name", metavar="NAME", default="", help="of the list; a second `up` of one name replaces the first; default: its file's")
     up.add_argument("--script", metavar="NAME", help="carry out this script of the list instead")
+    up.add_argument("--count", dest="counts", type=cmd_count, metavar="CMD=N", action="append", default=[],
+                    help="as many of this cmd on each of its hosts, instead of what the list says; may be repeated")
     up.add_argument("--out", metavar="DIR", help="the run's folder, on the node of the evaluator")
     up.add_argument("--set", dest="settings", type=assignment, metavar="section.key=value", action="append", default=[],
                     help="any setting of config/default.yaml; may be repeated")

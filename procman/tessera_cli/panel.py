@@ -144,8 +144,8 @@ def _draw_bar(progress: Progress):
 
 
 def _tracking_line(progress: Progress) -> str:
-    return (f"tracking: {progress.tracking_state or 'no pose yet'}   keyframes: {progress.num_keyframes}   "
-            f"landmarks: {progress.num_landmarks}   loops: {progress.num_loops}   dropped: {progress.num_dropped}")
+    return (f"tracking: {progress.tracking_state or 'no pose yet'}  keyframes: {progress.num_keyframes}  "
+            f"landmarks: {progress.num_landmarks}  loops: {progress.num_loops}  dropped: {progress.num_dropped}")
 
 
 def _draw_stages(progress: Progress):

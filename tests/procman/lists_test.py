@@ -131,6 +131,17 @@ def test_a_list_that_ended_is_forgotten_with_the_next_order(make_node):
     assert set(node.status()["lists"]) == {"robot_b", "pool"}
 
 
+def test_counts_of_the_command_line_replace_those_of_the_list(make_node):
+    node = make_node(COMMANDS).start()
+    text = listed("sleeper", more="count = 0;") + listed("talker", more="count = 2;")
+    assert node.up(text, "--count", "talker=1", "--count", "sleeper=1", name="counted").returncode == 0
+    assert set(pids(node, "counted")) == {"talker_0", "sleeper"}
+    up = node.up(text, "--count", "walker=1", name="counted")
+    assert up.returncode == 2 and "no cmd \"walker\"" in up.stderr
+    up = node.up(text, "--count", "talker=many", name="counted")
+    assert up.returncode == 2 and "not CMD=NUMBER" in up.stderr
+
+
 def test_who_begins_to_watch_late_knows_how_much_is_left():
     view = ListView(f"udpm://{GROUP}:{FIRST_PORT}?ttl=0", "A_")
     camera = stage_status_t()

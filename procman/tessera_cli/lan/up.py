@@ -17,7 +17,7 @@ from tessera_cli.lan.sheriff import Sheriff
 
 
 def main(arguments: Namespace) -> int:
-    process_list = read_process_list(Path(arguments.file))
+    process_list = read_process_list(Path(arguments.file), dict(arguments.counts))
     if arguments.script and arguments.script not in process_list.scripts:
         raise UserError(f"{arguments.file} has no script '{arguments.script}'; it has: {', '.join(process_list.scripts) or 'none'}.")
     name = _name(arguments)
