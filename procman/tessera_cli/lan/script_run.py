@@ -61,17 +61,27 @@ class ScriptRun:
         from tessera_cli.summary import in_words, write_summary
 
         settings.write_settings(self._assignments, Path(folder) / "settings.yaml")
-        return in_words(write_summary(Path(folder), self._run_facts(), self._process_facts()), Path(folder))
+        return in_words(write_summary(Path(folder), self._run_facts(Path(folder)), self._process_facts()), Path(folder))
 
-    def _run_facts(self):
+    def _run_facts(self, folder: Path):
         from tessera_cli.summary import RunFacts
 
-        last_pose_at = self._view.progress.last_pose_at
         return RunFacts(
             source=self._values["camera"]["source"], sensor=self._values["camera"]["sensor"], tiles=self._values["dispatcher"]["tiles"],
             extractors=len({name for (name, _), life in self._lives.items() if life.command == "extractor"}),
-            wall_s=max(0.0, last_pose_at - self._camera_at) if last_pose_at and self._camera_at else 0.0, ended="complete",
+            wall_s=self._wall_s(folder), ended="complete",
             messages_undecodable=sum(status.num_undecodable for status in self._view.statuses.values()))
+
+    def _wall_s(self, folder: Path) -> float:
+        """From the camera's start to the last pose; of a run that had all its poses before the script began, between its poses."""
+        import numpy as np
+
+        from tessera_cli.run_folder import read_frames
+
+        if (last_pose_at := self._view.progress.last_pose_at) and self._camera_at:
+            return max(0.0, last_pose_at - self._camera_at)
+        frames = read_frames(folder / "frames.csv")
+        return float(np.nansum(frames.pose_time_ms)) / 1000 if frames else 0.0
 
     def _process_facts(self):
         from tessera_cli.summary import ProcessFacts
