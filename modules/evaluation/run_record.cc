@@ -25,6 +25,10 @@ std::string RunRecord::ApplyDelta(const MapDelta& delta) {
   return map_.Apply(delta);
 }
 
+void RunRecord::AddRemoved(const RemovedInDelta& removed) {
+  for (const KeyframeTie& tie : removed.ties) removed_.Add(tie);
+}
+
 void RunRecord::AddGroundTruth(const GroundTruthPose& truth) {
   truth_.try_emplace(truth.frame, truth.frame, truth.utime_us, truth.world_from_camera);
 }

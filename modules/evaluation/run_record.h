@@ -58,6 +58,8 @@ class RunRecord {
   void AddPose(const PoseEstimate& pose, int64_t publish_us);
   // The next change of the map. Returns Map::Apply's sentence.
   [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
+  // What was removed from the map, also before the first change that came here.
+  void AddRemoved(const RemovedInDelta& removed);
   void AddGroundTruth(const GroundTruthPose& truth);
   // The newest figures replace those before.
   void SetStage(const std::string& name, const StageFigures& figures);

@@ -1,12 +1,27 @@
 // Where keyframes stood that are no longer in the map, so that what was stored relative to them keeps its place.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "map/map.h"
 
 namespace tessera {
+
+// A keyframe that is no longer in the map, and where it stood.
+struct KeyframeTie {
+  KeyframeId keyframe;
+  KeyframeId parent;  // may be gone too
+  Sim3 parent_from_keyframe;
+};
+
+// What the delta with this number removed, as those who followed the map then remember it (REMOVED_KEYFRAMES).
+struct RemovedInDelta {
+  int64_t delta = 0;
+  std::vector<KeyframeTie> ties;
+};
 
 class RemovedKeyframes {
  public:
@@ -16,6 +31,8 @@ class RemovedKeyframes {
   void Remember(const Map& map, const MapDelta& delta);
   // Ties one keyframe of the map to its parent.
   void Remember(const Map& map, KeyframeId id);
+  // What was removed when nobody here followed the map. What is remembered already stays; ties in a circle are ignored.
+  void Add(const KeyframeTie& tie);
 
   // Keyframe::WorldFromKeyframe of one that is in the map or has been there; nullopt of one that never was.
   std::optional<Sim3> Find(const Map& map, KeyframeId id) const;
@@ -28,6 +45,28 @@ class RemovedKeyframes {
     Sim3 parent_from_keyframe;
   };
   std::map<KeyframeId, Tie> ties_;
+};
+
+// The owner's memory of where keyframes stood before its last delta, from which it tells what followers remember, to the
+// last bit: 100 bytes for each keyframe.
+class KeyframePlaces {
+ public:
+  // `map`: the owner's, with which it begins.
+  void Begin(const Map& map);
+  // The owner's map changed by `delta`, and is now `map`.
+  RemovedInDelta Update(const MapDelta& delta, const Map& map);
+
+ private:
+  struct Place {
+    KeyframeId parent;
+    Sim3 world_from_keyframe;
+  };
+  void Set(const Map& map, KeyframeId id);
+  void Tie(KeyframeId id, RemovedInDelta* removed);
+  std::optional<Sim3> Find(KeyframeId id) const;
+
+  std::map<KeyframeId, Place> places_;
+  std::map<KeyframeId, KeyframeTie> ties_;
 };
 
 }  // namespace tessera

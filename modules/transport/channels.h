@@ -33,6 +33,7 @@ inline const Channel kKeyframeChannel{"KEYFRAME", BusKind::kMain};
 inline const Channel kMapDeltaChannel{"MAP_DELTA", BusKind::kMain};
 inline const Channel kMapRequestChannel{"MAP_REQUEST", BusKind::kMain};
 inline const Channel kMapSnapshotChannel{"MAP_SNAPSHOT", BusKind::kMain};
+inline const Channel kRemovedKeyframesChannel{"REMOVED_KEYFRAMES", BusKind::kMain};
 inline const Channel kLoopResultChannel{"LOOP_RESULT", BusKind::kMain};
 inline const Channel kGlobalAdjustmentChannel{"GLOBAL_ADJUSTMENT", BusKind::kMain};
 inline const Channel kRelocalizationRequestChannel{"RELOCALIZATION_REQUEST", BusKind::kMain};

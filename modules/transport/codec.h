@@ -16,6 +16,7 @@
 #include "geometry/camera_frame.h"
 #include "map/loop_types.h"
 #include "map/map_exchange.h"
+#include "map/removed_keyframes.h"
 #include "map/tracking_types.h"
 #include "transport/bytes.h"
 #include "transport/map_file.h"

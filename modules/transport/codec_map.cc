@@ -1,4 +1,4 @@
-// MAP_DELTA, MAP_SNAPSHOT, MAP_REQUEST; and what a map file begins with.
+// MAP_DELTA, MAP_SNAPSHOT, MAP_REQUEST, REMOVED_KEYFRAMES; and what a map file begins with.
 #include <algorithm>
 
 #include "map/map_exchange.h"
@@ -6,6 +6,7 @@
 #include "tessera/map_file_t.hpp"
 #include "tessera/map_request_t.hpp"
 #include "tessera/map_snapshot_t.hpp"
+#include "tessera/removed_keyframes_t.hpp"
 #include "transport/codec_impl.h"
 #include "transport/codec_map_change.h"
 #include "transport/codec_parts.h"
@@ -130,5 +131,45 @@ struct Codec<MapRequest> {
   }
 };
 TESSERA_CODEC(MapRequest);
+
+template <>
+struct Codec<RemovedInDelta> {
+  using Message = removed_keyframes_t;
+  static constexpr const char* kTypeName = "removed_keyframes_t";
+  static constexpr size_t kBytesPerTie = 80;
+
+  template <class Emit>
+  static void Cut(const RemovedInDelta& removed, Message* message, size_t max_bytes, Emit emit) {
+    message->delta = removed.delta;
+    message->num_ties = 0;
+    const auto overhead = static_cast<size_t>(message->getEncodedSize());
+    const size_t per_part = std::max<size_t>(1, (max_bytes - std::min(max_bytes, overhead)) / kBytesPerTie);
+    size_t next = 0;
+    do {
+      message->ties.clear();
+      for (; next < removed.ties.size() && message->ties.size() < per_part; ++next) {
+        keyframe_tie_t& tie = message->ties.emplace_back();
+        tie.keyframe = removed.ties[next].keyframe.value;
+        tie.parent = removed.ties[next].parent.value;
+        tie.parent_from_keyframe = ToMessage(removed.ties[next].parent_from_keyframe);
+      }
+      message->num_ties = static_cast<int32_t>(message->ties.size());
+      emit(*message);
+    } while (next < removed.ties.size());
+  }
+  static std::string Join(const Message& message, RemovedInDelta* removed) {
+    if (message.header.part == 0) *removed = {message.delta, {}};
+    std::string problem = Require(message.delta >= 0 && message.delta == removed->delta, "its delta is out of range");
+    for (size_t i = 0; problem.empty() && i < static_cast<size_t>(message.num_ties); ++i) {
+      KeyframeTie& tie = removed->ties.emplace_back();
+      tie.keyframe.value = message.ties[i].keyframe;
+      tie.parent.value = message.ties[i].parent;
+      problem = FirstProblem({Require(tie.parent.valid() && tie.keyframe.valid(), "a keyframe is out of range"),
+                              FromMessage(message.ties[i].parent_from_keyframe, &tie.parent_from_keyframe)});
+    }
+    return problem;
+  }
+};
+TESSERA_CODEC(RemovedInDelta);
 
 }  // namespace tessera

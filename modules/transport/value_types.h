@@ -16,6 +16,7 @@
   X(MapDelta)                          \
   X(MapRequest)                        \
   X(MapSnapshotPage)                   \
+  X(RemovedInDelta)                    \
   X(LoopResult)                        \
   X(GlobalAdjustment)                  \
   X(RelocalizationRequest)             \

@@ -90,6 +90,41 @@ TEST(RemovedKeyframes, GoAlongWhenTheMapIsBent) {
   }
 }
 
+// The owner tells, to the last bit, what a follower remembers that was there all the time.
+TEST(RemovedKeyframes, OneThatCameLateIsToldTheSame) {
+  for (const bool at_once : {false, true}) {
+    Map map = Chain();
+    RemovedKeyframes followed, told;
+    KeyframePlaces places;
+    places.Begin(map);
+    std::vector<std::vector<KeyframeId>> steps{{{2}}, {{1}}};
+    if (at_once) steps = {{{1}, {2}}};
+    for (const auto& ids : steps) {
+      for (const KeyframeTie& tie : places.Update(Remove(map, ids, followed), map).ties) told.Add(tie);
+      MapEditor editor(map);
+      map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
+        editor.MoveKeyframe(id, kBend * keyframe.WorldFromKeyframe());
+      });
+      EXPECT_TRUE(places.Update(editor.Finish({9}), map).ties.empty());
+    }
+    for (int64_t id = 0; id < 4; ++id) {
+      const Sim3 a = *followed.Find(map, {id}), b = *told.Find(map, {id});
+      EXPECT_EQ(a.scale, b.scale);
+      EXPECT_EQ(a.translation, b.translation);
+      EXPECT_EQ(a.rotation.coeffs(), b.rotation.coeffs());
+    }
+  }
+}
+
+TEST(RemovedKeyframes, TiesInACircleAreIgnored) {
+  RemovedKeyframes removed;
+  for (const auto& [keyframe, parent] : {std::pair(5, 6), std::pair(6, 7), std::pair(7, 5), std::pair(8, 8)}) {
+    removed.Add({{keyframe}, {parent}, {}});
+  }
+  EXPECT_FALSE(removed.Find(Map(), {5}).has_value());
+  EXPECT_FALSE(removed.Find(Map(), {8}).has_value());
+}
+
 // A frame's pose is stored relative to a keyframe, in its units of that time. What it saw then, it sees at the same
 // pixels after any bending, at a distance that grew with the place.
 TEST(RemovedKeyframes, APoseKeepsItsPlaceInItsSurroundings) {

@@ -26,7 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kNumFrames = 50;
+constexpr int64_t kNumFrames = 50;       // of most runs
+constexpr int64_t kNumLongFrames = 220;  // of one that makes more keyframes than the mapper keeps deltas
 
 void WriteImage(const std::string& path, const GrayImage& image) {
   std::ofstream file(path, std::ios::binary);
@@ -39,11 +40,12 @@ class Sequence {
  public:
   Sequence() {
     for (const char* folder : {"/03", "/03/image_0", "/03/image_1"}) fs::create_directory(folder_.path() + folder);
-    const MovingScene scene;
+    const MovingScene scene(kNumLongFrames);
     std::ofstream times(folder_.File("03/times.txt")), poses(folder_.File("03/poses.txt"));
-    for (int64_t id = 0; id < kNumFrames; ++id) {
+    for (int64_t id = 0; id < kNumLongFrames; ++id) {
       const CameraFrame frame = scene.Frame(id);
-      const std::string name = std::string(id < 10 ? "00000" : "0000") + std::to_string(id) + ".pgm";
+      const std::string digits = std::to_string(id);
+      const std::string name = std::string(6 - digits.size(), '0') + digits + ".pgm";
       WriteImage(folder_.File("03/image_0/" + name), frame.left);
       WriteImage(folder_.File("03/image_1/" + name), frame.right);
       times << 0.1 * static_cast<double>(id) << "\n";
@@ -59,14 +61,15 @@ class Sequence {
   RunFolder folder_;
 };
 
-Settings SettingsOf(const RunFolder& folder) {
+Settings SettingsOf(const RunFolder& folder, int64_t num_frames, double keyframe_min_share) {
   static const Sequence sequence;
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("camera.source=kitti:" + sequence.path());
   settings.Override("camera.sensor=stereo");
   settings.Override("dispatcher.tiles=2x2");
-  settings.Override("features.num_features=600");
-  settings.Override("tracker.keyframe_min_share=0.9");  // a short way, and yet many keyframes
+  settings.Override("features.num_features=400");
+  settings.Override("camera.last_frame=" + std::to_string(num_frames));
+  settings.Override("tracker.keyframe_min_share=" + std::to_string(keyframe_min_share));
   settings.Override("tracker.relocalize=false");  // nobody is there to answer
   settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());
@@ -75,9 +78,16 @@ Settings SettingsOf(const RunFolder& folder) {
 
 class StackRun {
  public:
-  StackRun() : bus_(SettingsOf(folder_)) {
-    bus_.AddContext("probe").Subscribe<PoseEstimate>(
-        kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) { last_pose_ = std::max(last_pose_, pose.frame); });
+  // A share of 0.9 makes many keyframes on a short way.
+  explicit StackRun(int64_t num_frames = kNumFrames, double keyframe_min_share = 0.9)
+      : bus_(SettingsOf(folder_, num_frames, keyframe_min_share)) {
+    StageContext& probe = bus_.AddContext("probe");
+    probe.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+      last_pose_ = std::max(last_pose_, pose.frame);
+    });
+    probe.Subscribe<MapSnapshotPage>(kMapSnapshotChannel, [this](const MapSnapshotPage& page, const MessageInfo&) {
+      snapshot_ = page.part.number;
+    });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<MapperStage>("mapper");
     bus_.Start<TrackerStage>("tracker");
@@ -98,6 +108,7 @@ class StackRun {
   template <class Stage>
   void Restart(const std::string& name) {
     bus_.Kill(name);
+    fs::remove(folder_.File("run.json"));  // which SIGKILL would not have let the evaluator write
     Wait();
     bus_.Start<Stage>(name);
   }
@@ -106,11 +117,14 @@ class StackRun {
     bus_.RunUntil([] { return false; }, 0.2);
   }
   MemoryBus& bus() { return bus_; }
+  // The last delta that a snapshot which was asked for holds; -1: there was none.
+  int64_t snapshot() const { return snapshot_; }
 
  private:
   RunFolder folder_;
   MemoryBus bus_;
   FrameId last_pose_;
+  int64_t snapshot_ = -1;
 };
 
 void ExpectSame(const nlohmann::json& figures) {
@@ -144,6 +158,23 @@ TEST(Revival, AReassemblerIsGivenWhatIsNotTracked) { ExpectSameAfterDeathsOf<Rea
 TEST(Revival, ADispatcherGoesOnBehindWhatIsTracked) { ExpectSameAfterDeathsOf<DispatcherStage>("dispatcher"); }
 
 TEST(Revival, ACameraGoesOnBehindWhatIsTracked) { ExpectSameAfterDeathsOf<CameraStage>("camera"); }
+
+TEST(Revival, AnEvaluatorIsToldAllAgain) { ExpectSameAfterDeathsOf<EvaluatorStage>("evaluator"); }
+
+// Poses are relative to keyframes that left the map before the snapshot that it begins with.
+TEST(Revival, AnEvaluatorIsToldWhatLeftTheMapBeforeIt) {
+  const nlohmann::json expected = StackRun(kNumLongFrames, 0.999).Finish();
+  ASSERT_FALSE(expected.is_null());
+  StackRun run(kNumLongFrames, 0.999);
+  ASSERT_TRUE(run.Reach(kNumLongFrames - 5));
+  run.Restart<EvaluatorStage>("evaluator");
+  const nlohmann::json figures = run.Finish();
+  ASSERT_FALSE(figures.is_null());
+  EXPECT_GT(run.snapshot(), 40);
+  for (const char* key : {"frames_tracked", "keyframes", "trajectory_sha256", "map_sha256"}) {
+    EXPECT_EQ(figures[key], expected[key]) << key;
+  }
+}
 
 TEST(Revival, AllStagesBeforeTheTrackerDieAtOnce) {
   StackRun run;

@@ -191,6 +191,8 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.page = page.num_pages; });
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.part.removed_keyframes.push_back({1}); });
   ExpectRefused<MapRequest>([](MapRequest& request) { request.page = -1; });
+  ExpectRefused<RemovedInDelta>([](RemovedInDelta& removed) { removed.ties.push_back({{3}, {-1}, {}}); });
+  ExpectRefused<RemovedInDelta>([](RemovedInDelta& removed) { removed.delta = -1; });
 }
 
 TEST(Codec, LoopsAndAdjustmentsOutOfRangeAreRefused) {

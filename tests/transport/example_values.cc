@@ -373,6 +373,21 @@ bool AreSameSimilarity(const Sim3& a, const Sim3& b) {
 }  // namespace
 
 template <>
+RemovedInDelta DrawValue<RemovedInDelta>(std::mt19937& generator, int size) {
+  RemovedInDelta removed{.delta = Draw(generator, 0, 999), .ties = {}};
+  const int num_ties = size == 0 ? 0 : 2000;
+  for (int i = 0; i < num_ties; ++i) removed.ties.push_back({{i}, {Draw(generator, 0, 99)}, DrawSimilarity(generator)});
+  return removed;
+}
+template <>
+bool AreSame(const RemovedInDelta& a, const RemovedInDelta& b) {
+  return a.delta == b.delta && AreSameLists(a.ties, b.ties, [](const auto& x, const auto& y) {
+           return x.keyframe == y.keyframe && x.parent == y.parent &&
+                  AreSameSimilarity(x.parent_from_keyframe, y.parent_from_keyframe);
+         });
+}
+
+template <>
 LoopResult DrawValue<LoopResult>(std::mt19937& generator, int size) {
   LoopResult result;
   result.answers = {Draw(generator, 10, 999)};

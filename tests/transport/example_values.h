@@ -32,6 +32,7 @@ void ForEachSentType(Visit visit) {
   visit.template operator()<MapDelta>();
   visit.template operator()<MapSnapshotPage>();
   visit.template operator()<MapRequest>();
+  visit.template operator()<RemovedInDelta>();
   visit.template operator()<LoopResult>();
   visit.template operator()<GlobalAdjustment>();
   visit.template operator()<RelocalizationRequest>();

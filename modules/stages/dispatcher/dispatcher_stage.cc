@@ -83,16 +83,18 @@ void DispatcherStage::OnFrame(const CameraFrame& frame, const MessageInfo& info)
   if (!first_camera_epoch_us_) first_camera_epoch_us_ = info.epoch_us;
   if (frame.id <= newest_) {
     // A camera that was started again repeats what is not tracked yet.
-    if (info.epoch_us == *first_camera_epoch_us_) context_.ReportError("frame " + std::to_string(frame.id.value) + " came after frame " +
-                         std::to_string(newest_.value) + " and is ignored: is there a second camera?");
+    if (info.epoch_us == *first_camera_epoch_us_) {
+      context_.ReportError("frame " + std::to_string(frame.id.value) + " came after frame " +
+                           std::to_string(newest_.value) + " and is ignored: is there a second camera?");
+    }
     return;
   }
   NoteGapBefore(frame.id);
   newest_ = frame.id;
-  // A dispatcher that was started again hears all that the camera still has, before it knows what of that is tracked.
   Arrived arrived{frame, info.arrival_us, info.publish_us < context_.epoch_us()};
   if (!calibration_) {
-    if (arrived.is_late || before_calibration_.size() < kMaxFramesBeforeCalibration) {
+    const size_t num_waiting = before_calibration_.size();
+    if (num_waiting < kMaxFramesBeforeCalibration || MustKeep(arrived, static_cast<int64_t>(num_waiting))) {
       before_calibration_.push_back(std::move(arrived));
     } else {
       ++num_dropped_;
@@ -125,6 +127,15 @@ void DispatcherStage::OnPose(FrameId frame) {
   GiveWork();
 }
 
+// A dispatcher that was started again hears all that the camera still has, before it knows what of that is tracked: not
+// more than a history holds. (Old too is what a log player sends.)
+bool DispatcherStage::MustKeep(const Arrived& arrived, int64_t num_waiting) const {
+  const CameraFrame& frame = arrived.frame;
+  const size_t num_bytes = frame.left.pixels.size() + frame.right.pixels.size() + 2 * frame.depth.pixels.size();
+  const int64_t history_bytes = context_.settings().Get<int>("stream.history_bytes");
+  return arrived.is_late && num_waiting * static_cast<int64_t>(num_bytes) < history_bytes;
+}
+
 // What a reassembler has is lost with it: its successor begins with nothing.
 void DispatcherStage::OnAck(const TileAck& ack, const MessageInfo& info) {
   if (reassembler_epoch_us_ && *reassembler_epoch_us_ != info.epoch_us) {
@@ -153,7 +164,8 @@ void DispatcherStage::QueueFrame(Arrived arrived) {
     return;
   }
   const FrameId id = frame.id;
-  if (!queue_.AddFrame(std::move(arrived.frame), *calibration_, arrived.arrival_us, arrived.is_late)) {
+  const bool must_keep = MustKeep(arrived, queue_.num_waiting());
+  if (!queue_.AddFrame(std::move(arrived.frame), *calibration_, arrived.arrival_us, must_keep)) {
     ++num_dropped_;
     context_.AddDropped(1);
     context_.ReportError("the pipeline is slower than the source: frame " + std::to_string(id.value) +

@@ -28,6 +28,7 @@ class DispatcherStage {
     bool is_late = false;  // sent before this dispatcher was started
   };
   void QueueFrame(Arrived arrived);
+  bool MustKeep(const Arrived& arrived, int64_t num_waiting) const;
   void GiveWork();
   void Watch();
   void FinishIfDone();

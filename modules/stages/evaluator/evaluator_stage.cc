@@ -48,6 +48,12 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
     last_news_us_ = context_.now_us();
     FinishIfDone();
   });
+  // One that was started again begins with a snapshot of the map, which does not hold all that poses are relative to.
+  context.Subscribe<RemovedInDelta>(kRemovedKeyframesChannel, [this](const RemovedInDelta& removed, const MessageInfo&) {
+    record_.AddRemoved(removed);
+    num_removals_known_ = std::max(num_removals_known_, removed.delta + 1);
+    FinishIfDone();
+  });
   context.Subscribe<GroundTruthPose>(
       kGroundTruthChannel,
       [this](const GroundTruthPose& truth, const MessageInfo&) { record_.AddGroundTruth(truth); });
@@ -102,7 +108,8 @@ void EvaluatorStage::OnDeltas() {
 // All poses and the whole map, or what came of them.
 bool EvaluatorStage::HasAll() const {
   const bool has_poses = end_ && last_pose_.value + 1 >= end_->num_frames;
-  const bool has_map = mapper_end_ && !map_.needs_snapshot() && record_.map().next_delta() >= mapper_end_->num_values;
+  const bool has_map = mapper_end_ && !map_.needs_snapshot() && record_.map().next_delta() >= mapper_end_->num_values &&
+                       num_removals_known_ >= mapper_end_->num_values;
   return (has_poses && has_map) || (end_ && context_.now_us() - last_news_us_ > kLastNewsTimeoutUs);
 }
 

@@ -38,6 +38,7 @@ class EvaluatorStage {
   std::optional<EndOfStream> end_;           // the tracker's
   std::optional<EndOfStream> mapper_end_;
   FrameId last_pose_;
+  int64_t num_removals_known_ = 0;           // what deltas below this number removed is known
   int64_t last_news_us_ = 0;                 // when the last pose, change of the map or end came
   std::optional<int64_t> complete_us_;       // when the ends, all poses and the whole map were there
   std::map<std::string, int64_t> heard_us_;  // by stage: when its last status came

@@ -52,6 +52,8 @@ MapperStage::MapperStage(StageContext& context)
       schedule_(DelaysFrom(context.settings())) {
   if (const auto path = context.settings().Get<std::string>("mapper.load_map"); !path.empty()) Load(path);
   deltas_ = context.Advertise<MapDelta>(kMapDeltaChannel);
+  removed_ = context.Advertise<RemovedInDelta>(kRemovedKeyframesChannel);
+  if (mapper_.map().next_delta() > 0) removed_.Publish({.delta = mapper_.map().next_delta() - 1, .ties = {}});
   pages_ = context.Advertise<MapSnapshotPage>(kMapSnapshotChannel);
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
   context.Subscribe<KeyframeObservation>(
@@ -81,6 +83,7 @@ void MapperStage::Load(const std::string& path) {
     throw InputError("map file " + path + " is damaged: " + problem);
   }
   archive_.Begin(mapper_.map());
+  places_.Begin(mapper_.map());
   next_keyframe_ = {mapper_.map().answered().value + 1};
   schedule_.BeginAt(next_keyframe_);
 }
@@ -119,6 +122,7 @@ void MapperStage::Publish(MapDelta&& delta) {
   const auto shared = std::make_shared<const MapDelta>(std::move(delta));
   archive_.Add(shared, mapper_.map(), schedule_.asked_delta());
   deltas_.Publish(*shared);
+  removed_.Publish(places_.Update(*shared, mapper_.map()));
   context_.SetValue("keyframes", static_cast<double>(mapper_.map().keyframes().size()));
   context_.SetValue("landmarks", static_cast<double>(mapper_.map().landmarks().size()));
   context_.SetValue("loops", static_cast<double>(mapper_.map().closed_loops().size()));

@@ -8,6 +8,7 @@
 
 #include "geometry/camera_frame.h"
 #include "map/map_archive.h"
+#include "map/removed_keyframes.h"
 #include "stages/mapper/correction_schedule.h"
 #include "stages/mapper/mapper.h"
 #include "transport/stage.h"
@@ -35,8 +36,10 @@ class MapperStage {
   std::deque<KeyframeObservation> waiting_;
   int64_t num_processed_ = 0;    // keyframes
   MapArchive archive_;
+  KeyframePlaces places_;
   Publisher<MapDelta> deltas_;
   Publisher<MapSnapshotPage> pages_;
+  Publisher<RemovedInDelta> removed_;
   Publisher<EndOfStream> end_of_stream_;
   std::optional<EndOfStream> tracker_end_;
 };
