@@ -118,3 +118,22 @@ def test_it_comes_back_when_deputies_die_and_a_cable_is_pulled(make_node, lan, s
     finally:
         script.kill()
     must_equal(tmp_path / "out", reference)
+
+
+def test_the_node_of_the_camera_dies_and_the_run_begins_anew(make_node, lan, sequence, reference, tmp_path):
+    """Nobody else has what its tracker knew; the extractors on the other nodes go on."""
+    nodes = make_nodes(make_node, lan)
+    line = run_script(nodes[1], "lan.pmd", sequence, tmp_path / "out", "--set", "camera.pace=0.5")
+    script = subprocess.Popen(nodes[1].line(*line), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        wait_for(lambda: len(nodes[0].marked()) == len(STAGES), "the camera")
+        extractors = nodes[1].marked()
+        nodes[0].kill()
+        wait_for(lambda: not nodes[0].marked(), "the end of the orphans")
+        nodes[0].start()
+        wait_for(lambda: len(nodes[0].marked()) == len(STAGES), "the camera again")
+        assert nodes[1].marked() == extractors
+        assert script.wait(120) == 0, script.stdout.read()
+    finally:
+        script.kill()
+    must_equal(tmp_path / "out", reference)
