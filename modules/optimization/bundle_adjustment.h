@@ -60,7 +60,7 @@ struct BundleOptions {
   // Of the trust region at the start of a round, as Ceres has it: damping is the curvature's diagonal over this. The slow
   // modes of a long street have a curvature far below the diagonal: where they must move, begin with less damping.
   double initial_radius = 1e4;
-  // Up to this many free poses the reduced camera system is solved dense, above it sparse (CHOLMOD). Dense is the
+  // Up to this many free poses the reduced camera system is solved dense, above it sparse. Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
   int max_num_dense_poses = 60;
   // Dense systems by Ceres too, instead of by WindowSolver, which takes the same steps in a quarter of the time.

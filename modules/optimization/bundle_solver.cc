@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "optimization/sparse_library.h"
+
 namespace tessera {
 namespace {
 
@@ -158,6 +160,7 @@ std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_
   ceres::Solver::Options options;
   options.linear_solver_type =
       num_free_poses <= options_.max_num_dense_poses ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  options.sparse_linear_algebra_library_type = kSparseLibrary;
   options.linear_solver_ordering = Ordering();
   options.max_num_iterations = options_.max_num_iterations;
   options.function_tolerance = options_.function_tolerance;

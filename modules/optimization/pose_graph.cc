@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "optimization/pose_graph_costs.h"
+#include "optimization/sparse_library.h"
 
 namespace tessera {
 namespace {
@@ -55,7 +56,7 @@ std::vector<char> TiedToFixed(const PoseGraphProblem& problem) {
 ceres::Solver::Options SolverOptions(const PoseGraphOptions& options) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  solver.sparse_linear_algebra_library_type = kSparseLibrary;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
   // Both depend on the map's unit.
