@@ -4,20 +4,10 @@
 #include <map>
 #include <set>
 
+#include "map/neighbourhood.h"
+
 namespace tessera {
 namespace {
-
-std::vector<LandmarkId> LandmarksSeenBy(const Map& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<LandmarkId> landmarks;
-  for (const KeyframeId id : keyframes) {
-    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-      if (landmark.valid()) landmarks.push_back(landmark);
-    }
-  }
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
-  return landmarks;
-}
 
 // The keyframes outside `inner` that see most of the landmarks; ties go to the lower id. Sorted by id.
 std::vector<KeyframeId> BestOutsiders(const Map& map, const std::vector<KeyframeId>& inner,

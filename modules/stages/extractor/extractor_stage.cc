@@ -36,14 +36,14 @@ std::vector<std::string> OtherRobots(const Settings& settings) {
 
 }  // namespace
 
-ExtractorStage::ExtractorStage(StageContext& context)
-    : context_(context),
-      is_pool_(!context.settings().Get<std::string>("extractor.robots").empty()),
-      queue_(1 + OtherRobots(context.settings()).size()) {
+ExtractorStage::ExtractorStage(StageContext& context) : ExtractorStage(context, OtherRobots(context.settings())) {}
+
+ExtractorStage::ExtractorStage(StageContext& context, const std::vector<std::string>& other_robots)
+    : context_(context), queue_(1 + other_robots.size()) {
   began_us_ = context.now_us();
   robots_.push_back({.context = &context, .prefix = context.settings().Get<std::string>("bus.channel_prefix")});
   Serve(0);
-  for (const std::string& prefix : OtherRobots(context.settings())) {
+  for (const std::string& prefix : other_robots) {
     robots_.push_back({.context = &context.JoinRobot(prefix), .prefix = prefix});
   }
   context.WhenIdle([this] { return DoNextJob(); });
@@ -90,12 +90,12 @@ void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
                                std::to_string(job.tile) + " is refused: " + problem);
   }
   owner.context->SetQueue(static_cast<int64_t>(queue_.num_waiting(robot)));
-  if (robots_.size() == 1) DoNextJob();  // nobody to be fair to: as it comes
+  if (!is_pool()) DoNextJob();  // nobody to be fair to: as it comes
 }
 
 void ExtractorStage::OnEnd(size_t robot, const EndOfStream& end) {
   if (end.stage != "dispatcher") return;
-  if (is_pool_) {
+  if (is_pool()) {
     robots_[robot].features.Forget();  // all its answers have arrived
   } else {
     context_.Finish();

@@ -28,6 +28,9 @@ class ExtractorStage {
     int64_t work_done = 0;                // as WorkOf
   };
 
+  ExtractorStage(StageContext& context, const std::vector<std::string>& other_robots);
+  // Serves robots that come and go.
+  bool is_pool() const { return robots_.size() > 1; }
   void Serve(size_t robot);
   // Begins to serve those robots of which it is known that no other process has this one's name there.
   void ServeOthers();
@@ -38,7 +41,6 @@ class ExtractorStage {
   void SayReady();
 
   StageContext& context_;
-  const bool is_pool_;  // serves robots that come and go
   std::vector<Robot> robots_;
   FairQueue queue_;
   Extractor extractor_;

@@ -58,8 +58,7 @@ void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, co
   }
 }
 
-}  // namespace
-
+// In the order of its keypoints.
 std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe) {
   std::vector<LandmarkId> landmarks;
   for (const LandmarkId id : keyframe.landmarks) {
@@ -67,6 +66,8 @@ std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe) {
   }
   return landmarks;
 }
+
+}  // namespace
 
 void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<LandmarkId>& landmarks,
                       const FusionOptions& options, MapEditor& editor) {

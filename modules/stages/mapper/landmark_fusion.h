@@ -28,7 +28,4 @@ void FuseLandmarks(KeyframeId keyframe, const FusionOptions& options, MapEditor&
 void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<LandmarkId>& landmarks,
                       const FusionOptions& options, MapEditor& editor);
 
-// The landmarks that the keyframe sees.
-std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe);
-
 }  // namespace tessera
