@@ -4,7 +4,7 @@ import importlib
 import os
 import sys
 
-from tessera_cli.arguments import parse_arguments
+from tessera_cli.cli.arguments import parse_arguments
 from tessera_cli.errors import RunFailed, UserError
 
 

@@ -8,7 +8,7 @@ import yaml
 
 from tessera_cli.errors import UserError
 from tessera_cli.files import BIN, ROOT
-from tessera_cli.sources import Source
+from tessera_cli.runs.sources import Source
 
 GROUP = "239.255.76.67"
 # A message that fits one packet of a LAN: the loss of a fragment would lose it whole.

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from conftest import RUN_TIMEOUT_S
-from tessera_cli.arguments import DEMO_FRAMES
-from tessera_cli.demo import log_name
+from tessera_cli.cli.arguments import DEMO_FRAMES
+from tessera_cli.runs.demo import log_name
 
 FRAMES = 60
 

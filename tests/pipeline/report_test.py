@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from made_run import LOST, NUM_FRAMES, write_run
-from tessera_cli.report import TEMPLATES, write_report
-from tessera_cli.run_folder import read_pair, read_run
-from tessera_cli.words import remarks
+from tessera_cli.report.html_report import TEMPLATES, write_report
+from tessera_cli.runs.run_folder import read_pair, read_run
+from tessera_cli.report.sentences import remarks
 
 VOID = {"meta", "wbr", "link", "br", "hr", "img", "input"}
 # Namespaces are names that nobody fetches.

@@ -11,9 +11,9 @@ import pytest
 
 from conftest import FIRST_PORT, NUM_FRAMES, ROOT, RUN_TIMEOUT_S
 from tessera_cli import settings
-from tessera_cli.bus import BusListener
+from tessera_cli.supervision.stack_monitor import BusListener
 from tessera_cli.files import BIN
-from tessera_cli.progress import RUNNING
+from tessera_cli.supervision.progress import RUNNING
 
 DATA = Path(os.environ.get("TESSERA_DATA", ROOT.parent / "shared" / "data"))
 KITTI_03 = DATA / "kitti" / "sequences" / "03"

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tessera_cli.run_folder import Result
-from tessera_cli.terminal_plot import draw_from_above
-from tessera_cli.trajectories import Trajectory, absolute_error
+from tessera_cli.runs.run_folder import Result
+from tessera_cli.report.terminal_plot import draw_from_above
+from tessera_cli.runs.trajectories import Trajectory, absolute_error
 
 
 def path_through(corners) -> Trajectory:

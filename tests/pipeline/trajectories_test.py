@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tessera_cli.errors import UserError
-from tessera_cli.trajectories import Trajectory, absolute_error, read_trajectory
+from tessera_cli.runs.trajectories import Trajectory, absolute_error, read_trajectory
 
 
 def make_path(num_poses: int = 50) -> Trajectory:

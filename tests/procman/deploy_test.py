@@ -13,9 +13,9 @@ import pytest
 
 from deputies import ROOT, environment, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 from tessera_cli.errors import UserError
-from tessera_cli.lan import deploy
-from tessera_cli.lan.keys import KeyRing, to_text
-from tessera_cli.lan.node_facts import Here, NodeFacts, obstacles, own_key_name, parse_facts, read_packages, remarks, shortcomings
+from tessera_cli.cluster import deploy
+from tessera_cli.cluster.keys import KeyRing, to_text
+from tessera_cli.cluster.node_facts import Here, NodeFacts, obstacles, own_key_name, parse_facts, read_packages, remarks, shortcomings
 
 TOLD = """host board1
 architecture aarch64

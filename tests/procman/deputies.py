@@ -58,7 +58,7 @@ class Node:
         self.process.wait(TIMEOUT_S)
 
     def marked(self) -> list[int]:
-        from tessera_cli.lan.tree import marked
+        from tessera_cli.supervision.process_tree import marked
 
         return marked(f"{self.folder / 'state'}/")
 

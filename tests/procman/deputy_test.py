@@ -11,10 +11,10 @@ from nacl.signing import SigningKey
 
 from deputies import environment, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 from orders_test import KEY, bad_order
-from tessera_cli.lan.keys import KeyRing, to_text
-from tessera_cli.lan.orders import Gate, sign
+from tessera_cli.cluster.keys import KeyRing, to_text
+from tessera_cli.supervision.orders import Gate, sign
 from tessera_cli.settings import GROUP
-from tessera_cli.types import procman_order_t, procman_status_t
+from tessera_cli.messages import procman_order_t, procman_status_t
 
 COMMANDS = '''
 cmd "sleeper"   { exec = "sleep 1000"; }

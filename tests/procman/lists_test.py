@@ -1,10 +1,10 @@
 """Several lists on the same deputies: each is started, replaced, ended and resumed alone."""
 
 from deputies import FIRST_PORT, Node, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
-from tessera_cli.lan.list_view import ListView
-from tessera_cli.lan.tree import marked
+from tessera_cli.supervision.list_monitor import ListView
+from tessera_cli.supervision.process_tree import marked
 from tessera_cli.settings import GROUP
-from tessera_cli.types import pose_t, stage_status_t
+from tessera_cli.messages import pose_t, stage_status_t
 
 COMMANDS = '''
 cmd "sleeper"   { exec = "sleep 1000"; }

@@ -7,9 +7,9 @@ from nacl.signing import SigningKey
 
 from deputies import own_keys  # noqa: F401, sets the path to tessera_cli too
 from tessera_cli.errors import UserError
-from tessera_cli.lan.keys import KeyRing, to_text
-from tessera_cli.lan.orders import KEY_BYTES, SIGNATURE_BYTES, Gate, sign
-from tessera_cli.types import procman_order_t, procman_wish_t
+from tessera_cli.cluster.keys import KeyRing, to_text
+from tessera_cli.supervision.orders import KEY_BYTES, SIGNATURE_BYTES, Gate, sign
+from tessera_cli.messages import procman_order_t, procman_wish_t
 
 KEY = SigningKey(bytes(range(32)))
 OTHER_KEY = SigningKey(bytes(range(1, 33)))

@@ -1,9 +1,9 @@
 """What processes say: kept on the node within bounds, forwarded as whole lines within bounds."""
 
 from deputies import make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
-from tessera_cli.lan.log_file import RotatingLog
-from tessera_cli.lan.output import MAX_BYTES, TAIL_BYTES, OutputForwarder
-from tessera_cli.types import header_t, procman_output_t
+from tessera_cli.supervision.log_file import RotatingLog
+from tessera_cli.supervision.output_forwarder import MAX_BYTES, TAIL_BYTES, OutputForwarder
+from tessera_cli.messages import header_t, procman_output_t
 
 
 class RecordingBus:

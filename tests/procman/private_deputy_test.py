@@ -10,15 +10,15 @@ import pytest
 
 from deputies import ROOT, environment, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 from tessera_cli.errors import RunFailed, UserError
-from tessera_cli.lan.attributes import RunOptions
-from tessera_cli.lan.child import Child, Launch
-from tessera_cli.lan.command_list import read_command_list
-from tessera_cli.lan.private_deputy import PrivateDeputy
-from tessera_cli.lan.process_list import Process, read_process_list
-from tessera_cli.lan.state_folder import LogFolder
-from tessera_cli.lan.supervised import STATE_NAMES
-from tessera_cli.lan.tree import marked
-from tessera_cli.progress import FINISHED, RUNNING, StageReport
+from tessera_cli.supervision.attributes import RunOptions
+from tessera_cli.supervision.child_process import Child, Launch
+from tessera_cli.supervision.command_list import read_command_list
+from tessera_cli.supervision.private_deputy import PrivateDeputy
+from tessera_cli.supervision.process_list import Process, read_process_list
+from tessera_cli.supervision.state_folder import LogFolder
+from tessera_cli.supervision.supervised_process import STATE_NAMES
+from tessera_cli.supervision.process_tree import marked
+from tessera_cli.supervision.progress import FINISHED, RUNNING, StageReport
 
 COMMANDS = '''
 cmd "sleeper"  { exec = "sleep 1000"; }
@@ -92,7 +92,7 @@ def test_one_that_is_beyond_help_is_told_in_a_sentence(make_deputy, tmp_path, co
 
 
 def test_one_that_dies_again_and_again_is_given_up(make_deputy, monkeypatch):
-    monkeypatch.setattr("tessera_cli.lan.supervised.FIRST_BACK_OFF_S", 0.0)
+    monkeypatch.setattr("tessera_cli.supervision.supervised_process.FIRST_BACK_OFF_S", 0.0)
     deputy = make_deputy(process("faulty", auto_respawn="failure"))
     with pytest.raises(RunFailed, match="faulty died 7 times in a row, the last time it ended with status 3; .*: the disk is missing"):
         step_until(deputy, lambda: False, "its end")
@@ -184,10 +184,10 @@ def test_a_folder_belongs_to_one_deputy_at_a_time(tmp_path):
 KILLED = '''
 import os, signal, sys
 from pathlib import Path
-from tessera_cli.lan.private_deputy import PrivateDeputy
-from tessera_cli.lan.command_list import read_command_list
-from tessera_cli.lan.process_list import read_process_list
-from tessera_cli.lan.state_folder import LogFolder
+from tessera_cli.supervision.private_deputy import PrivateDeputy
+from tessera_cli.supervision.command_list import read_command_list
+from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.state_folder import LogFolder
 folder = Path(sys.argv[1])
 deputy = PrivateDeputy(LogFolder(folder / "logs", ""), folder, read_process_list(folder / "list.pmd").processes.values(),
                        read_command_list(folder / "commands.pmd"))

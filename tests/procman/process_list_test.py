@@ -6,8 +6,8 @@ import pytest
 
 from deputies import ROOT, own_keys  # noqa: F401, sets the path to tessera_cli too
 from tessera_cli.errors import UserError
-from tessera_cli.lan.command_list import read_command_list
-from tessera_cli.lan.process_list import read_process_list
+from tessera_cli.supervision.command_list import read_command_list
+from tessera_cli.supervision.process_list import read_process_list
 
 
 def write(tmp_path, text):

@@ -1,0 +1,1 @@
+"""The command line: what people type, and one module for each command."""

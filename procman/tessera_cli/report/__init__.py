@@ -1,0 +1,1 @@
+"""Results for people: reports, figures, tables and sentences."""

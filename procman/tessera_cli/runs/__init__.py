@@ -1,0 +1,1 @@
+"""Runs of the whole stack: their sources, settings, start, progress and results in a folder."""

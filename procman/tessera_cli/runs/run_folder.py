@@ -1,0 +1,187 @@
+"""What a run left in its folder, or what two trajectory files say, read for evaluation and report.
+
+Positions of `Result.estimate` are in the estimate's own world; `Result.in_truth` takes them over into the truth's.
+"""
+
+import csv
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from tessera_cli.errors import UserError
+from tessera_cli.runs.trajectories import Trajectory, TrajectoryError, absolute_error, read_trajectory
+
+LOOP_COLUMNS = ("keyframe_timestamp_s", "matched_timestamp_s", "inliers", "scale")
+# Trajectory files keep microseconds.
+SAME_TIME_S = 1e-4
+
+
+@dataclass(frozen=True)
+class Frames:
+    """frames.csv, n rows in order of the frames' numbers. What is unknown is NaN."""
+
+    times_s: np.ndarray  # in the source
+    states: list[str]  # initializing, tracked, lost
+    pose_time_ms: np.ndarray  # since the pose before was published
+    latency_ms: np.ndarray
+    map_wait_ms: np.ndarray
+    matches: np.ndarray
+    inliers: np.ndarray
+    landmarks: np.ndarray  # in the tracker's copy of the map
+    is_keyframe: np.ndarray  # bool
+    numbers: np.ndarray
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A place seen again: times of the two keyframes, as in trajectory.txt."""
+
+    keyframe_s: float
+    matched_s: float
+    inliers: int
+
+
+@dataclass(frozen=True)
+class Result:
+    """One run, or one trajectory with its truth. What there is not is None or empty."""
+
+    name: str
+    estimate: Trajectory | None
+    error: TrajectoryError | None = None
+    error_note: str = ""  # why there is no error
+    truth: Trajectory | None = None
+    live: Trajectory | None = None  # as it was published at the time
+    summary: dict = field(default_factory=dict)
+    frames: Frames | None = None
+    loops: list[Loop] = field(default_factory=list)
+    settings: dict = field(default_factory=dict)  # sections of keys
+    log_warnings: list[str] = field(default_factory=list)
+
+    @property
+    def unit(self) -> str:
+        return "map units" if self.error is None and self.summary.get("sensor", "mono") == "mono" else "m"
+
+    def in_truth(self, positions: np.ndarray) -> np.ndarray:
+        """n x 3 of the estimate's world, where the alignment puts them; as they are without one."""
+        return self.error.align(positions) if self.error else positions
+
+
+def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None = None) -> Result:
+    """`alignment`: sim3 or se3, by default what the sensor knows. Raises UserError if it is no run's folder."""
+    if not any((folder / name).is_file() for name in ("summary.json", "trajectory.txt", "trajectory_kitti.txt")):
+        raise UserError(f"{folder} is no run's folder: it holds no trajectory.txt.")
+    summary = _read_summary(folder / "summary.json")
+    truth = _read_if_there(truth_path or folder / "ground_truth.txt")
+    estimate = _read_if_there(folder / "trajectory.txt")
+    if truth_path and truth is None:
+        raise UserError(f"{truth_path}: holds no pose.")
+    error, note = measure_error(_what_goes_with(truth, estimate, folder), truth, alignment or default_alignment(summary))
+    return Result(name=folder.absolute().name, estimate=estimate, error=error, error_note=note, truth=truth,
+                  live=_read_if_there(folder / "trajectory_live.txt"), summary=summary, frames=read_frames(folder / "frames.csv"),
+                  loops=read_loops(folder / "loops.csv"), settings=_read_settings(folder / "settings.yaml"),
+                  log_warnings=read_log_warnings(folder / "stages"))
+
+
+def read_pair(estimate_path: Path, truth_path: Path, alignment: str | None = None) -> Result:
+    """Any two trajectory files. Raises UserError if they don't belong together."""
+    estimate, truth = read_trajectory(estimate_path), read_trajectory(truth_path)
+    error = absolute_error(estimate, truth, with_scale=(alignment or "sim3") == "sim3")
+    return Result(name=estimate_path.stem, estimate=estimate, error=error, truth=truth)
+
+
+def default_alignment(summary: dict) -> str:
+    """Mono doesn't know its scale; stereo and RGB-D must."""
+    return "sim3" if summary.get("sensor", "mono") == "mono" else "se3"
+
+
+def measure_error(estimate: Trajectory | None, truth: Trajectory | None, alignment: str) -> tuple[TrajectoryError | None, str]:
+    """The error, or None and the reason in words."""
+    if truth is None:
+        return None, "the source has no ground truth"
+    if estimate is None:
+        return None, "no frame was tracked"
+    try:
+        return absolute_error(estimate, truth, with_scale=alignment == "sim3"), ""
+    except UserError as problem:
+        return None, str(problem)
+
+
+def _what_goes_with(truth: Trajectory | None, estimate: Trajectory | None, folder: Path) -> Trajectory | None:
+    """The run's trajectory that belongs to the truth: by time or by frame."""
+    return estimate if truth is None or truth.has_times else _read_if_there(folder / "trajectory_kitti.txt")
+
+
+def _read_if_there(path: Path) -> Trajectory | None:
+    if not path.is_file() or not any(line.strip() and not line.startswith("#") for line in path.read_text().splitlines()):
+        return None
+    return read_trajectory(path)
+
+
+def _read_summary(path: Path) -> dict:
+    if not path.is_file():
+        return {}
+    try:
+        return json.loads(path.read_text())
+    except ValueError as error:
+        raise UserError(f"{path}: is no JSON ({error}).") from error
+
+
+def _read_settings(path: Path) -> dict:
+    return yaml.safe_load(path.read_text()) or {} if path.is_file() else {}
+
+
+def _read_rows(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        return []
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def read_frames(path: Path) -> Frames | None:
+    rows = _read_rows(path)
+    if not rows:
+        return None
+
+    def column(name: str) -> np.ndarray:
+        return np.array([float(row[name]) if row.get(name) else np.nan for row in rows])
+
+    try:
+        return Frames(times_s=1e-6 * column("utime_us"), states=[row["state"] for row in rows], pose_time_ms=column("pose_time_ms"),
+                      latency_ms=column("latency_ms"), map_wait_ms=column("map_wait_ms"), matches=column("matches"),
+                      inliers=column("inliers"), landmarks=column("landmarks"), is_keyframe=column("is_keyframe") > 0,
+                      numbers=column("frame").astype(int))
+    except (KeyError, ValueError) as error:
+        raise UserError(f"{path}: is no table of frames ({error}).") from error
+
+
+def read_loops(path: Path) -> list[Loop]:
+    """Columns LOOP_COLUMNS; none if there is no file."""
+    try:
+        return [Loop(float(row[LOOP_COLUMNS[0]]), float(row[LOOP_COLUMNS[1]]), int(float(row[LOOP_COLUMNS[2]])))
+                for row in _read_rows(path)]
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{path}: is no table of loops; its columns must be {', '.join(LOOP_COLUMNS)}.") from error
+
+
+def read_log_warnings(folder: Path) -> list[str]:
+    """For each process that warned: how often, and its first words."""
+    found = []
+    for path in sorted(folder.glob("*.log")):
+        lines = [line for line in path.read_text(errors="replace").splitlines() if " warning: " in line or " error: " in line]
+        if lines:
+            first = lines[0].split(": ", 1)[1]
+            found.append(f"{path.stem} reported {len(lines)} {'problem' if len(lines) == 1 else 'problems'}, the first: {first}")
+    return found
+
+
+def positions_at(trajectory: Trajectory, times_s: list[float]) -> np.ndarray:
+    """n x 3, of the poses at these times; NaN where there is none."""
+    positions = np.full((len(times_s), 3), np.nan)
+    for i, time_s in enumerate(times_s):
+        nearest = int(np.argmin(np.abs(trajectory.timestamps_s - time_s)))
+        if abs(trajectory.timestamps_s[nearest] - time_s) <= SAME_TIME_S:
+            positions[i] = trajectory.positions[nearest]
+    return positions
