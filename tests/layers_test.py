@@ -34,13 +34,13 @@ def stage_of(path: str) -> str | None:
     return parts[1] if len(parts) > 2 and parts[0] == "stages" else None
 
 
-def test_every_folder_is_a_layer():
+def test_every_folder_is_a_layer() -> None:
     folders = {layer_of(path) for path in sources()}
     assert folders, "modules/ holds no sources"
     assert folders <= set(layers())
 
 
-def test_includes_point_down():
+def test_includes_point_down() -> None:
     order = {layer: height for height, layer in enumerate(layers())}
     wrong = []
     for path in sources():
@@ -49,40 +49,54 @@ def test_includes_point_down():
             if LCM_HEADER.match(header):
                 continue  # generated; another test is about them
             if quote == '"' and layer not in order:
-                wrong.append(f"{path.relative_to(MODULES)}: \"{header}\" names no layer; write the path from modules/")
+                wrong.append(f'{path.relative_to(MODULES)}: "{header}" names no layer; write the path from modules/')
             elif quote == '"' and order[layer] > order[layer_of(path)]:
-                wrong.append(f"{path.relative_to(MODULES)} includes \"{header}\", which is above it")
+                wrong.append(f'{path.relative_to(MODULES)} includes "{header}", which is above it')
     assert not wrong, "\n".join(wrong)
 
 
-def test_no_stage_includes_another():
-    wrong = [f"{path.relative_to(MODULES)} includes \"{header}\""
-             for path in sources() for _, header in includes(path)
-             if stage_of(header) and stage_of(header) != stage_of(str(path.relative_to(MODULES)))]
+def test_no_stage_includes_another() -> None:
+    wrong = [
+        f'{path.relative_to(MODULES)} includes "{header}"'
+        for path in sources()
+        for _, header in includes(path)
+        if stage_of(header) and stage_of(header) != stage_of(str(path.relative_to(MODULES)))
+    ]
     assert not wrong, "\n".join(wrong)
 
 
-def test_transport_alone_sees_lcm():
-    wrong = [f"{path.relative_to(MODULES)} includes \"{header}\""
-             for path in sources() for _, header in includes(path)
-             if LCM_HEADER.match(header) and layer_of(path) != "transport"]
+def test_transport_alone_sees_lcm() -> None:
+    wrong = [
+        f'{path.relative_to(MODULES)} includes "{header}"'
+        for path in sources()
+        for _, header in includes(path)
+        if LCM_HEADER.match(header) and layer_of(path) != "transport"
+    ]
     assert not wrong, "\n".join(wrong)
 
 
-def test_nothing_is_drawn_at_random_without_a_seed():
-    wrong = [str(path.relative_to(MODULES)) for path in sources() if re.search(r"random_device|\b(rand|srand)\(", path.read_text())]
+def test_nothing_is_drawn_at_random_without_a_seed() -> None:
+    wrong = [
+        str(path.relative_to(MODULES))
+        for path in sources()
+        if re.search(r"random_device|\b(rand|srand)\(", path.read_text())
+    ]
     assert not wrong, "\n".join(wrong)
 
 
-def test_pure_modules_have_no_clock_and_no_threads():
+def test_pure_modules_have_no_clock_and_no_threads() -> None:
     """Logical time only: below transport nothing reads a clock or starts a thread."""
     forbidden = {"chrono", "ctime", "time.h", "sys/time.h", "thread", "mutex", "atomic", "future"}
-    wrong = [f"{path.relative_to(MODULES)} includes <{header}>"
-             for path in sources() if layer_of(path) not in ("transport", "stages")
-             for _, header in includes(path) if header in forbidden]
+    wrong = [
+        f"{path.relative_to(MODULES)} includes <{header}>"
+        for path in sources()
+        if layer_of(path) not in ("transport", "stages")
+        for _, header in includes(path)
+        if header in forbidden
+    ]
     assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.parametrize("line, header", [('#include "a/b.h"', "a/b.h"), ("  #  include <lcm/lcm.h>", "lcm/lcm.h")])
-def test_includes_are_recognised(line, header):
+def test_includes_are_recognised(line, header) -> None:
     assert INCLUDE.findall(line)[0][1] == header

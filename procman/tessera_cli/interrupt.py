@@ -4,7 +4,7 @@ import signal
 
 
 class Interrupt:
-    def __init__(self):
+    def __init__(self) -> None:
         self.requested = False
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._on_signal)

@@ -9,8 +9,8 @@ from collections.abc import Callable
 import lcm
 
 from tessera_cli.errors import RunFailed
-from tessera_cli.settings import GROUP
 from tessera_cli.messages import header_t
+from tessera_cli.settings import GROUP
 
 PORT_OFFSET = 3  # from the base port: 7667 -> 7670
 QUEUE_CAPACITY = 1000
@@ -32,7 +32,7 @@ def procman_url(arguments: Namespace) -> str:
 class Bus:
     """One LCM instance."""
 
-    def __init__(self, url: str, publisher: str):
+    def __init__(self, url: str, publisher: str) -> None:
         self.url = url
         self._publisher = publisher
         self._epoch_us = int(time.time() * 1e6)
@@ -44,6 +44,7 @@ class Bus:
 
     def subscribe(self, channel: str, message_type, handler: Callable) -> None:
         """`handler` gets decoded messages, or bytes where `message_type` is None. What makes no sense is left out."""
+
         def on_message(_channel: str, data: bytes) -> None:
             try:
                 message = data if message_type is None else message_type.decode(data)
@@ -82,5 +83,7 @@ class Bus:
 
 
 def _explain(url: str, why: object) -> str:
-    return (f"the bus {url} can't be opened ({why}). Does another program hold its port (ss -ulpn shows which; --port N takes others)? "
-            "Is multicast possible? Try: sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo (with --lan: dev the network's device)")
+    return (
+        f"the bus {url} can't be opened ({why}). Does another program hold its port (ss -ulpn shows which; --port N takes others)? "
+        "Is multicast possible? Try: sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo (with --lan: dev the network's device)"
+    )

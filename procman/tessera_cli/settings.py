@@ -15,9 +15,17 @@ GROUP = "239.255.76.67"
 LAN_MESSAGE_BYTES = 1400
 FIRST_TILE_PORT_OFFSET = 13  # from the base port: 7667 -> 7680
 # Keys that the command itself fills in.
-RESERVED = {"evaluator.out_dir": "--out DIR", "recorder.path": "--record", "camera.source": "SOURCE", "tracker.live": "--live",
-            "tracker.replay_log": "replay LOG", "mapper.close_loops": "--no-loop-closing", "mapper.load_map": "--load-map FILE",
-            "evaluator.save_map": "--save-map FILE", "tracker.localize_only": "--localize-only"}
+RESERVED = {
+    "evaluator.out_dir": "--out DIR",
+    "recorder.path": "--record",
+    "camera.source": "SOURCE",
+    "tracker.live": "--live",
+    "tracker.replay_log": "replay LOG",
+    "mapper.close_loops": "--no-loop-closing",
+    "mapper.load_map": "--load-map FILE",
+    "evaluator.save_map": "--save-map FILE",
+    "tracker.localize_only": "--localize-only",
+}
 
 
 def bus_url(port: int) -> str:
@@ -26,14 +34,21 @@ def bus_url(port: int) -> str:
 
 
 def port_assignments(port: int) -> list[str]:
-    return [f"bus.main_url={bus_url(port)}", f"bus.camera_url={bus_url(port + 1)}", f"bus.work_url={bus_url(port + 2)}",
-            f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}"]
+    return [
+        f"bus.main_url={bus_url(port)}",
+        f"bus.camera_url={bus_url(port + 1)}",
+        f"bus.work_url={bus_url(port + 2)}",
+        f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}",
+    ]
 
 
 def lan_assignments(port: int) -> list[str]:
     """As port_assignments, but for messages that leave this machine."""
     tile_url = f"bus.tile_url=udpm://{GROUP}:{{port}}?ttl=1"
-    return [text.replace("?ttl=0", "?ttl=1") for text in port_assignments(port)] + [tile_url, f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
+    return [text.replace("?ttl=0", "?ttl=1") for text in port_assignments(port)] + [
+        tile_url,
+        f"bus.max_message_bytes={LAN_MESSAGE_BYTES}",
+    ]
 
 
 def bus_assignments(source: Source, port: int) -> list[str]:

@@ -12,21 +12,29 @@ from tessera_cli.files import BUILD, ROOT
 
 def collect_versions() -> dict[str, str]:
     """Names and versions, in the order in which to show them. What can't be found out is left out."""
-    versions = {"Tessera": _commit(), **_of_build(BUILD / "versions.json"), "Python": platform.python_version(),
-                "system": f"{_system()}, Linux {platform.release()}", "CPU": f"{_cpu()}, {os.cpu_count()} cores",
-                "date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}"}
+    versions = {
+        "Tessera": _commit(),
+        **_of_build(BUILD / "versions.json"),
+        "Python": platform.python_version(),
+        "system": f"{_system()}, Linux {platform.release()}",
+        "CPU": f"{_cpu()}, {os.cpu_count()} cores",
+        "date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}",
+    }
     return {name: version for name, version in versions.items() if version}
 
 
 def _commit() -> str:
     """Empty outside of a git checkout."""
+
     def git(*arguments: str) -> str:
         finished = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True)
         return finished.stdout.strip() if finished.returncode == 0 else ""
 
     try:
         commit = git("rev-parse", "--short=12", "HEAD")
-        return commit + (", with changes that are not committed" if commit and git("status", "--porcelain", "-uno") else "")
+        return commit + (
+            ", with changes that are not committed" if commit and git("status", "--porcelain", "-uno") else ""
+        )
     except OSError:
         return ""
 

@@ -11,54 +11,60 @@ def must_refuse(finished, *words: str) -> None:
         assert word in finished.err
 
 
-@pytest.mark.parametrize("arguments, word", [
-    (["run"], "SOURCE"),
-    (["run", "kitti:/tmp", "--tiles", "0x3"], "--tiles"),
-    (["run", "kitti:/tmp", "--tiles", "2"], "--tiles"),
-    (["run", "kitti:/tmp", "--extractors", "-1"], "--extractors"),
-    (["run", "kitti:/tmp", "--extractors", "many"], "--extractors"),
-    (["run", "kitti:/tmp", "--features", "-5"], "--features"),
-    (["run", "kitti:/tmp", "--pace", "0"], "--pace"),
-    (["run", "kitti:/tmp", "--frames", "9:9"], "--frames"),
-    (["run", "kitti:/tmp", "--sensor", "sonar"], "--sensor"),
-    (["run", "kitti:/tmp", "--port", "80"], "--port"),
-    (["run", "kitti:/tmp", "--teleport"], "--teleport"),
-    (["run", "kitti:/tmp", "--set", "nonsense"], "--set"),
-    (["run", "kitti:/no/such/folder"], "/no/such/folder"),
-    (["run", "log:/no/such/file"], "/no/such/file"),
-    (["run", "kitti:"], "kitti:"),
-    (["run", "/some/folder"], "kitti:DIR"),
-    (["run", "film:x"], "film:x"),
-    (["run", "camera:front"], "camera:N"),
-    (["run", "bus:tcp://x"], "bus:"),
-    (["replay", "/no/such/file"], "/no/such/file"),
-    (["record", "kitti:/no/such/folder", "out.lcmlog"], "/no/such/folder"),
-    (["evaluate", "/no/such/file", "/no/such/truth"], "/no/such"),
-    (["experiment", "everything"], "extraction"),
-    (["map", "/no/such/folder/map.ply"], "/no/such/folder"),
-])
-def test_arguments_at_fault(tessera, arguments, word):
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["run"], "SOURCE"),
+        (["run", "kitti:/tmp", "--tiles", "0x3"], "--tiles"),
+        (["run", "kitti:/tmp", "--tiles", "2"], "--tiles"),
+        (["run", "kitti:/tmp", "--extractors", "-1"], "--extractors"),
+        (["run", "kitti:/tmp", "--extractors", "many"], "--extractors"),
+        (["run", "kitti:/tmp", "--features", "-5"], "--features"),
+        (["run", "kitti:/tmp", "--pace", "0"], "--pace"),
+        (["run", "kitti:/tmp", "--frames", "9:9"], "--frames"),
+        (["run", "kitti:/tmp", "--sensor", "sonar"], "--sensor"),
+        (["run", "kitti:/tmp", "--port", "80"], "--port"),
+        (["run", "kitti:/tmp", "--teleport"], "--teleport"),
+        (["run", "kitti:/tmp", "--set", "nonsense"], "--set"),
+        (["run", "kitti:/no/such/folder"], "/no/such/folder"),
+        (["run", "log:/no/such/file"], "/no/such/file"),
+        (["run", "kitti:"], "kitti:"),
+        (["run", "/some/folder"], "kitti:DIR"),
+        (["run", "film:x"], "film:x"),
+        (["run", "camera:front"], "camera:N"),
+        (["run", "bus:tcp://x"], "bus:"),
+        (["replay", "/no/such/file"], "/no/such/file"),
+        (["record", "kitti:/no/such/folder", "out.lcmlog"], "/no/such/folder"),
+        (["evaluate", "/no/such/file", "/no/such/truth"], "/no/such"),
+        (["experiment", "everything"], "extraction"),
+        (["map", "/no/such/folder/map.ply"], "/no/such/folder"),
+    ],
+)
+def test_arguments_at_fault(tessera, arguments, word) -> None:
     must_refuse(tessera.command(*arguments), word)
 
 
-@pytest.mark.parametrize("setting, word", [
-    ("features.no_such_key=1", "features.no_such_key"),
-    ("features.num_features=many", "features.num_features"),
-    ("evaluator.out_dir=/tmp", "--out"),
-    ("camera.source=kitti:/tmp", "SOURCE"),
-    ("tracker.live=true", "--live"),
-    ("tracker.map_delay_frames=0", "map_delay_frames"),
-    ("mapper.bundle_iterations=0", "mapper"),
-])
-def test_settings_at_fault(tessera, sequence, setting, word):
+@pytest.mark.parametrize(
+    "setting, word",
+    [
+        ("features.no_such_key=1", "features.no_such_key"),
+        ("features.num_features=many", "features.num_features"),
+        ("evaluator.out_dir=/tmp", "--out"),
+        ("camera.source=kitti:/tmp", "SOURCE"),
+        ("tracker.live=true", "--live"),
+        ("tracker.map_delay_frames=0", "map_delay_frames"),
+        ("mapper.bundle_iterations=0", "mapper"),
+    ],
+)
+def test_settings_at_fault(tessera, sequence, setting, word) -> None:
     must_refuse(tessera.run(f"kitti:{sequence}", "--set", setting), word)
 
 
-def test_missing_calibration_file(tessera, sequence):
+def test_missing_calibration_file(tessera, sequence) -> None:
     must_refuse(tessera.run(f"kitti:{sequence}", "--camera", "/no/such/camera.yaml"), "/no/such/camera.yaml")
 
 
-def test_settings_of_a_stage_at_fault(tessera, sequence):
+def test_settings_of_a_stage_at_fault(tessera, sequence) -> None:
     """A value of the right type that makes no sense: the stage that reads it says so."""
     finished = tessera.run(f"kitti:{sequence}", "--set", "features.num_levels=0")
     assert finished.status == 2, finished.out + finished.err

@@ -41,13 +41,19 @@ class Finished:
 class Tessera:
     """`command` starts any subcommand, `run` one with a folder and ports of its own."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._num_runs = 0
 
     def command(self, *arguments, timeout: float = RUN_TIMEOUT_S) -> Finished:
-        finished = subprocess.run(self._command_line(arguments), capture_output=True, text=True, timeout=timeout,
-                                  env=self._environment(), stdin=subprocess.DEVNULL)
+        finished = subprocess.run(
+            self._command_line(arguments),
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            env=self._environment(),
+            stdin=subprocess.DEVNULL,
+        )
         return Finished(finished.returncode, finished.stdout, finished.stderr, None)
 
     def run(self, *arguments, command: str = "run") -> Finished:
@@ -58,8 +64,14 @@ class Tessera:
 
     def start(self, *arguments) -> subprocess.Popen:
         """In the background; ends when the test ends it."""
-        return subprocess.Popen(self._command_line(arguments), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                                env=self._environment(), stdin=subprocess.DEVNULL)
+        return subprocess.Popen(
+            self._command_line(arguments),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=self._environment(),
+            stdin=subprocess.DEVNULL,
+        )
 
     def next_port(self) -> int:
         self._num_runs += 1

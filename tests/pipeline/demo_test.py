@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from conftest import RUN_TIMEOUT_S
 from tessera_cli.cli.arguments import DEMO_FRAMES
 from tessera_cli.runs.demo import log_name
+
+from conftest import RUN_TIMEOUT_S
 
 FRAMES = 60
 
@@ -31,28 +32,34 @@ def first(tessera, folder):
     return tessera.command("demo", "--frames", FRAMES, "--logs", folder, "--port", tessera.next_port()).must_end_well()
 
 
-def test_the_result_is_told(first, folder):
+def test_the_result_is_told(first, folder) -> None:
     assert f"All {FRAMES} frames were tracked." in first.out and "(RMS)" in first.out
-    named = {line.split(":")[0]: line.split()[1] for line in first.out.splitlines() if line.startswith(("picture:", "report:"))}
+    named = {
+        line.split(":")[0]: line.split()[1]
+        for line in first.out.splitlines()
+        if line.startswith(("picture:", "report:"))
+    }
     assert Path(named["picture"]).read_bytes().startswith(b"\x89PNG")
     assert "<!DOCTYPE html>" in Path(named["report"]).read_text()
 
 
-def test_only_its_own_old_drives_go(first, folder):
+def test_only_its_own_old_drives_go(first, folder) -> None:
     assert logs_in(folder) == sorted([log_name(FRAMES), "mine.lcmlog"])
 
 
-def test_a_second_call_uses_the_drive_again(tessera, first, folder):
+def test_a_second_call_uses_the_drive_again(tessera, first, folder) -> None:
     written_at = (folder / log_name(FRAMES)).stat().st_mtime_ns
     out = folder / "second"
-    again = tessera.command("demo", "--frames", FRAMES, "--logs", folder, "--out", out, "--port", tessera.next_port()).must_end_well()
+    again = tessera.command(
+        "demo", "--frames", FRAMES, "--logs", folder, "--out", out, "--port", tessera.next_port()
+    ).must_end_well()
     assert "rendered before" in again.out and "rendering" not in again.out
     assert (folder / log_name(FRAMES)).stat().st_mtime_ns == written_at
     assert (out / "report.html").is_file()
 
 
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_rendering_leaves_nothing(tessera, tmp_path, sign):
+def test_an_interrupted_rendering_leaves_nothing(tessera, tmp_path, sign) -> None:
     demo = tessera.start("demo", "--logs", tmp_path, "--port", tessera.next_port())
     deadline = time.monotonic() + RUN_TIMEOUT_S
     while not any(path.stat().st_size > 0 for path in tmp_path.iterdir()):
@@ -64,21 +71,35 @@ def test_an_interrupted_rendering_leaves_nothing(tessera, tmp_path, sign):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_default_is_the_whole_drive(tessera, tmp_path):
-    refused = tessera.command("record", "sim:street-short", tmp_path / "none.lcmlog", "--sensor", "stereo",
-                              "--frames", f"{DEMO_FRAMES}:{DEMO_FRAMES + 1}")
+def test_the_default_is_the_whole_drive(tessera, tmp_path) -> None:
+    refused = tessera.command(
+        "record",
+        "sim:street-short",
+        tmp_path / "none.lcmlog",
+        "--sensor",
+        "stereo",
+        "--frames",
+        f"{DEMO_FRAMES}:{DEMO_FRAMES + 1}",
+    )
     assert refused.status == 2 and f"has {DEMO_FRAMES} frames" in refused.err
 
 
-def test_the_name_of_a_drive_says_what_it_is():
+def test_the_name_of_a_drive_says_what_it_is() -> None:
     assert log_name(60) != log_name(61)
     assert log_name(60) == log_name(60)
     assert "-60-" in log_name(60)
 
 
-@pytest.mark.parametrize("arguments, word", [
-    (["--frames", "5"], "--frames"), (["--frames", DEMO_FRAMES + 1], "--frames"), (["--logs", "/no/such/folder"], "/no/such/folder"),
-    (["--port", "80"], "--port"), (["twice"], "twice")])
-def test_arguments_at_fault(tessera, arguments, word):
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["--frames", "5"], "--frames"),
+        (["--frames", DEMO_FRAMES + 1], "--frames"),
+        (["--logs", "/no/such/folder"], "/no/such/folder"),
+        (["--port", "80"], "--port"),
+        (["twice"], "twice"),
+    ],
+)
+def test_arguments_at_fault(tessera, arguments, word) -> None:
     refused = tessera.command("demo", *arguments)
     assert refused.status == 2 and word in refused.err and refused.err.count("\n") == 1, refused.err

@@ -14,13 +14,13 @@ def runs(tmp_path_factory) -> list[Path]:
     return [write_run(folder / name, seed) for seed, name in enumerate(("one", "two"))]
 
 
-def test_one_run_in_the_old_words(tessera, runs):
+def test_one_run_in_the_old_words(tessera, runs) -> None:
     out = tessera.command("evaluate", runs[0]).must_end_well().out
     assert [line.split()[0] for line in out.splitlines()] == ["poses", "alignment", "RMS", "mean"]
     assert "116 of 116 have a ground truth" in out and "SE(3)" in out
 
 
-def test_several_runs_in_a_table_and_a_report(tessera, runs, tmp_path):
+def test_several_runs_in_a_table_and_a_report(tessera, runs, tmp_path) -> None:
     report = tmp_path / "beside.html"
     out = tessera.command("evaluate", *runs, "--report", report).must_end_well().out
     assert [line.split()[0] for line in out.splitlines()] == ["poses", "one", "two", "report"]
@@ -28,16 +28,22 @@ def test_several_runs_in_a_table_and_a_report(tessera, runs, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == [report.name]
 
 
-def test_files_with_one_truth_for_all(tessera, runs, tmp_path):
+def test_files_with_one_truth_for_all(tessera, runs, tmp_path) -> None:
     truth, report = runs[0] / "ground_truth.txt", tmp_path / "files.html"
     alone = tessera.command("evaluate", runs[0] / "trajectory.txt", truth, "--align", "se3").must_end_well().out
-    both = tessera.command("evaluate", *(run / "trajectory.txt" for run in runs), truth, "--align", "se3", "--report", report).must_end_well().out
+    both = (
+        tessera.command(
+            "evaluate", *(run / "trajectory.txt" for run in runs), truth, "--align", "se3", "--report", report
+        )
+        .must_end_well()
+        .out
+    )
     rms_m = alone.split("RMS error")[1].split()[0]
     assert ["one/trajectory", "116", rms_m] == both.splitlines()[1].split()[:3]
     assert report.is_file()
 
 
-def test_a_run_without_truth(tessera, runs, tmp_path):
+def test_a_run_without_truth(tessera, runs, tmp_path) -> None:
     run = Path(shutil.copytree(runs[0], tmp_path / "run"))
     (run / "ground_truth.txt").unlink()
     refused = tessera.command("evaluate", run)
@@ -48,12 +54,12 @@ def test_a_run_without_truth(tessera, runs, tmp_path):
     assert given.out == tessera.command("evaluate", runs[0]).out
 
 
-def test_a_report_that_can_not_be_written(tessera, runs, tmp_path):
+def test_a_report_that_can_not_be_written(tessera, runs, tmp_path) -> None:
     refused = tessera.command("evaluate", runs[0], "--report", tmp_path / "none" / "report.html")
     assert refused.status == 2 and "--report" in refused.err
 
 
-def test_damaged_files_of_a_run_are_refused(tessera, runs, tmp_path):
+def test_damaged_files_of_a_run_are_refused(tessera, runs, tmp_path) -> None:
     for name, text in (("loops.csv", "a,b\n1,2\n"), ("frames.csv", "frame\n1\n"), ("summary.json", "{")):
         run = Path(shutil.copytree(runs[0], tmp_path / f"bad {name}"))
         (run / name).write_text(text)

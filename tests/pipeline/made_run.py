@@ -30,9 +30,13 @@ def write_run(folder: Path, seed: int = 1, truth: bool = True, loops: bool = Tru
     for name in ("trajectory.txt", "trajectory_live.txt", "keyframes.txt"):
         (folder / name).write_text("# timestamp tx ty tz qx qy qz qw\n" + "".join(rows.values()))
     if truth:
-        (folder / "ground_truth.txt").write_text("".join(tum_row(frame, true_position(frame)) for frame in range(NUM_FRAMES)))
+        (folder / "ground_truth.txt").write_text(
+            "".join(tum_row(frame, true_position(frame)) for frame in range(NUM_FRAMES))
+        )
     if loops:
-        (folder / "loops.csv").write_text("keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n11.500000,0.500000,80,1.0\n")
+        (folder / "loops.csv").write_text(
+            "keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n11.500000,0.500000,80,1.0\n"
+        )
     (folder / "frames.csv").write_text(_frames_csv())
     (folder / "settings.yaml").write_text("features:\n  num_features: 1234\n  num_levels: 8\n")
     (folder / "summary.json").write_text(json.dumps({**_summary(loops), **summary}))
@@ -40,22 +44,52 @@ def write_run(folder: Path, seed: int = 1, truth: bool = True, loops: bool = Tru
 
 
 def _frames_csv() -> str:
-    rows = ["frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,num_deltas"]
+    rows = [
+        "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,num_deltas"
+    ]
     for frame in range(NUM_FRAMES):
         state = "lost" if frame in LOST else "tracked"
         pose_time = "" if frame == 0 else f"{20 + frame % 7}.0"
-        rows.append(f"{frame},{100000 * frame},{state},{pose_time},{60 + frame % 11}.0,{frame % 3}.0,2000,500,{400 - frame},"
-                    f"{1000 + 50 * frame},{int(frame % 5 == 0)},0")
+        rows.append(
+            f"{frame},{100000 * frame},{state},{pose_time},{60 + frame % 11}.0,{frame % 3}.0,2000,500,{400 - frame},"
+            f"{1000 + 50 * frame},{int(frame % 5 == 0)},0"
+        )
     return "\n".join(rows) + "\n"
 
 
 def _summary(loops: bool) -> dict:
     times = {"mean": 23.0, "median": 23.0, "p95": 26.0, "p99": 26.0, "max": 26.0}
     waits = {"mean": 1.0, "median": 1.0, "p95": 2.0, "p99": 2.0, "max": 2.0}
-    return {"source": "sim:block", "sensor": "stereo", "extractors": 2, "tiles": "2x2", "ended": "complete", "frames": NUM_FRAMES,
-            "frames_tracked": NUM_FRAMES - len(LOST), "frames_lost": len(LOST), "frames_initializing": 0, "frames_dropped": 0,
-            "tracking_failures": 2, "keyframes": 24, "landmarks": 7000, "pose_time_ms": times, "latency_ms": times, "map_wait_ms": waits,
-            "stage_ms": {name: times for name in PROCESSES[:-1]}, "messages_repaired": 0, "messages_lost": 0, "messages_undecodable": 0,
-            "trajectory_sha256": "ab" * 32, "map_sha256": "cd" * 32, "relocalizations": 2, "loops_closed": int(loops),
-            "wall_s": 2.8, "frames_per_s": 42.9, "cpu_s": dict.fromkeys(PROCESSES, 1.5), "max_rss_mb": dict.fromkeys(PROCESSES, 70.0),
-            "extractor_restarts": 0, "warnings": [], "versions": {"Tessera": "0123456789ab", "LCM": "1.5.3"}}
+    return {
+        "source": "sim:block",
+        "sensor": "stereo",
+        "extractors": 2,
+        "tiles": "2x2",
+        "ended": "complete",
+        "frames": NUM_FRAMES,
+        "frames_tracked": NUM_FRAMES - len(LOST),
+        "frames_lost": len(LOST),
+        "frames_initializing": 0,
+        "frames_dropped": 0,
+        "tracking_failures": 2,
+        "keyframes": 24,
+        "landmarks": 7000,
+        "pose_time_ms": times,
+        "latency_ms": times,
+        "map_wait_ms": waits,
+        "stage_ms": dict.fromkeys(PROCESSES[:-1], times),
+        "messages_repaired": 0,
+        "messages_lost": 0,
+        "messages_undecodable": 0,
+        "trajectory_sha256": "ab" * 32,
+        "map_sha256": "cd" * 32,
+        "relocalizations": 2,
+        "loops_closed": int(loops),
+        "wall_s": 2.8,
+        "frames_per_s": 42.9,
+        "cpu_s": dict.fromkeys(PROCESSES, 1.5),
+        "max_rss_mb": dict.fromkeys(PROCESSES, 70.0),
+        "extractor_restarts": 0,
+        "warnings": [],
+        "versions": {"Tessera": "0123456789ab", "LCM": "1.5.3"},
+    }

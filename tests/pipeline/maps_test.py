@@ -37,7 +37,7 @@ def states(run) -> list[str]:
 
 
 @pytest.mark.parametrize("sensor", ["mono", "stereo"])
-def test_a_camera_that_saw_nothing_is_found_where_it_was_before(tessera, sequence, tmp_path, sensor):
+def test_a_camera_that_saw_nothing_is_found_where_it_was_before(tessera, sequence, tmp_path, sensor) -> None:
     frames = [*range(NUM_FRAMES), *[None] * NUM_BLACK, *range(20, 40)]
     blinded = rearrange(sequence, tmp_path / "blinded", frames)
     run = tessera.run(f"kitti:{blinded}", "--sensor", sensor).must_end_well()
@@ -49,7 +49,7 @@ def test_a_camera_that_saw_nothing_is_found_where_it_was_before(tessera, sequenc
     assert run.summary["rms_error_m"] < 0.05
 
 
-def test_a_camera_that_was_carried_back_goes_on_in_the_same_map(tessera, sequence, tmp_path):
+def test_a_camera_that_was_carried_back_goes_on_in_the_same_map(tessera, sequence, tmp_path) -> None:
     jumping = rearrange(sequence, tmp_path / "jumping", [*range(NUM_FRAMES), *range(5, 25)])
     run = tessera.run(f"kitti:{jumping}", "--sensor", "stereo").must_end_well()
     assert run.summary["frames_lost"] == 0
@@ -66,46 +66,55 @@ def saved(tessera, sequence, tmp_path_factory):
     return run, path
 
 
-def test_a_saved_map_places_every_frame_of_another_run(tessera, sequence, saved):
+def test_a_saved_map_places_every_frame_of_another_run(tessera, sequence, saved) -> None:
     run, path = saved
-    localized = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--localize-only").must_end_well()
+    localized = tessera.run(
+        f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--localize-only"
+    ).must_end_well()
     assert set(states(localized)) == {"tracked"}
     assert localized.summary["map_sha256"] == run.summary["map_sha256"]
     assert localized.summary["rms_error_m"] < max(0.005, 1.2 * run.summary["rms_error_m"])
 
 
-def test_a_saved_map_is_continued_and_again_the_same_each_time(tessera, sequence, saved):
+def test_a_saved_map_is_continued_and_again_the_same_each_time(tessera, sequence, saved) -> None:
     run, path = saved
-    continued = [tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--extractors", number).must_end_well()
-                 for number in (1, 3)]
+    continued = [
+        tessera.run(
+            f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--extractors", number
+        ).must_end_well()
+        for number in (1, 3)
+    ]
     assert continued[0].summary["keyframes"] > run.summary["keyframes"]
     assert continued[0].summary["frames_tracked"] == NUM_FRAMES
     for key in ("trajectory_sha256", "map_sha256"):
         assert continued[0].summary[key] == continued[1].summary[key]
 
 
-def test_a_broken_map_file_is_refused_in_one_sentence(tessera, sequence, saved, tmp_path):
+def test_a_broken_map_file_is_refused_in_one_sentence(tessera, sequence, saved, tmp_path) -> None:
     _, path = saved
     whole = path.read_bytes()
     cut = tmp_path / "cut.tessera"
     for tenth in (0, 3, 9):
-        cut.write_bytes(whole[:len(whole) * tenth // 10])
+        cut.write_bytes(whole[: len(whole) * tenth // 10])
         finished = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--load-map", cut)
         assert finished.status == 2 and str(cut) in finished.err and "Traceback" not in finished.err
     finished = tessera.run(f"kitti:{sequence}", "--sensor", "mono", "--load-map", path)
     assert finished.status == 2 and "another camera or sensor" in finished.err
 
 
-@pytest.mark.parametrize("arguments, words", [
-    (["--load-map", "/no/such/map"], "there is no file"),
-    (["--save-map", "/no/such/folder/map"], "there is no folder"),
-    (["--localize-only"], "needs a map"),
-    (["--set", "tracker.localize_only=true"], "--localize-only"),
-])
-def test_wrong_arguments_about_maps(tessera, sequence, arguments, words):
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["--load-map", "/no/such/map"], "there is no file"),
+        (["--save-map", "/no/such/folder/map"], "there is no folder"),
+        (["--localize-only"], "needs a map"),
+        (["--set", "tracker.localize_only=true"], "--localize-only"),
+    ],
+)
+def test_wrong_arguments_about_maps(tessera, sequence, arguments, words) -> None:
     finished = tessera.run(f"kitti:{sequence}", *arguments)
     assert finished.status == 2 and words in finished.err
 
 
-def test_the_vocabulary_is_part_of_the_project():
+def test_the_vocabulary_is_part_of_the_project() -> None:
     assert (ROOT / "config" / "vocabulary.tvoc").stat().st_size < 8_000_000

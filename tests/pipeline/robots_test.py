@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from conftest import FIRST_PORT, NUM_FRAMES, ROOT, RUN_TIMEOUT_S
 from tessera_cli import settings
-from tessera_cli.supervision.stack_monitor import BusListener
 from tessera_cli.files import BIN
 from tessera_cli.supervision.progress import RUNNING
+from tessera_cli.supervision.stack_monitor import BusListener
+
+from conftest import FIRST_PORT, NUM_FRAMES, ROOT, RUN_TIMEOUT_S
 
 DATA = Path(os.environ.get("TESSERA_DATA", ROOT.parent / "shared" / "data"))
 KITTI_03 = DATA / "kitti" / "sequences" / "03"
@@ -26,25 +27,41 @@ PORT = FIRST_PORT
 class Processes:
     """Stages with common settings."""
 
-    def __init__(self, folder: Path, assignments: list[str]):
+    def __init__(self, folder: Path, assignments: list[str]) -> None:
         folder.mkdir()
         self.folder = folder
         values = settings.write_settings(settings.port_assignments(PORT) + assignments, folder / "settings.yaml")
         self._running: dict[str, subprocess.Popen] = {}
         pids = self._running
-        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"],
-                                lambda pid: any(process.pid == pid for process in pids.values()))
+        self._bus = BusListener(
+            values["bus"]["main_url"],
+            values["bus"]["channel_prefix"],
+            lambda pid: any(process.pid == pid for process in pids.values()),
+        )
 
     def start(self, stage: str, number: int | None = None) -> None:
         name = stage if number is None else f"{stage}_{number}"
         with open(self.folder / f"{name}.log", "ab") as log:
             self._running[name] = subprocess.Popen(
-                [BIN / f"tessera-{stage.replace('_', '-')}", "--settings", self.folder / "settings.yaml", "--name", name, "--id", str(number or 0)],
-                stdout=log, stderr=log, stdin=subprocess.DEVNULL)
+                [
+                    BIN / f"tessera-{stage.replace('_', '-')}",
+                    "--settings",
+                    self.folder / "settings.yaml",
+                    "--name",
+                    name,
+                    "--id",
+                    str(number or 0),
+                ],
+                stdout=log,
+                stderr=log,
+                stdin=subprocess.DEVNULL,
+            )
 
     def wait_until_running(self) -> None:
         stages = self._bus.progress.stages
-        self.listen_until(lambda: all(name in stages and stages[name].state >= RUNNING for name in self._running), "the stages")
+        self.listen_until(
+            lambda: all(name in stages and stages[name].state >= RUNNING for name in self._running), "the stages"
+        )
 
     def listen_until(self, condition, what: str) -> None:
         deadline = time.monotonic() + RUN_TIMEOUT_S
@@ -79,7 +96,7 @@ class Processes:
 class Robot(Processes):
     """The processes of one robot but for extractors."""
 
-    def __init__(self, folder: Path, prefix: str, *assignments: str):
+    def __init__(self, folder: Path, prefix: str, *assignments: str) -> None:
         super().__init__(folder, [f"bus.channel_prefix={prefix}", f"evaluator.out_dir={folder}", *assignments])
 
     def start_all(self, num_extractors: int = 0) -> "Robot":
@@ -100,7 +117,7 @@ class Robot(Processes):
 
 
 class Pool(Processes):
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path) -> None:
         super().__init__(folder, ["extractor.robots=a_,b_"])
         for number in range(NUM_EXTRACTORS):
             self.start("extractor", number)
@@ -121,7 +138,10 @@ def tasks(sequence) -> dict[str, list[str]]:
 def alone(tasks, tmp_path_factory) -> dict[str, dict]:
     """What each robot comes to with one extractor of its own."""
     folder = tmp_path_factory.mktemp("alone")
-    return {prefix: Robot(folder / prefix, prefix, *task).start_all(num_extractors=1).result() for prefix, task in tasks.items()}
+    return {
+        prefix: Robot(folder / prefix, prefix, *task).start_all(num_extractors=1).result()
+        for prefix, task in tasks.items()
+    }
 
 
 @pytest.fixture
@@ -138,7 +158,7 @@ def start(tmp_path):
         processes.kill()
 
 
-def test_two_robots_share_four_extractors(start, tasks, alone):
+def test_two_robots_share_four_extractors(start, tasks, alone) -> None:
     pool = start(Pool, "pool")
     robots = {prefix: start(Robot, prefix, prefix, *task).start_all() for prefix, task in tasks.items()}
     assert {prefix: robot.result() for prefix, robot in robots.items()} == alone
@@ -146,7 +166,7 @@ def test_two_robots_share_four_extractors(start, tasks, alone):
         assert values["work_a_"] > 0 and values["work_b_"] > 0
 
 
-def test_a_shared_extractor_that_is_killed_changes_nothing(start, tasks, alone):
+def test_a_shared_extractor_that_is_killed_changes_nothing(start, tasks, alone) -> None:
     pool = start(Pool, "pool")
     robots = {prefix: start(Robot, prefix, prefix, *task).start_all() for prefix, task in tasks.items()}
     robots["a_"].listen_until(lambda: robots["a_"].num_poses > NUM_FRAMES // 4, "poses")
@@ -155,7 +175,7 @@ def test_a_shared_extractor_that_is_killed_changes_nothing(start, tasks, alone):
     assert {prefix: robot.result() for prefix, robot in robots.items()} == alone
 
 
-def test_robots_come_and_go_and_come_again(start, tasks, alone):
+def test_robots_come_and_go_and_come_again(start, tasks, alone) -> None:
     start(Pool, "pool")
     a = start(Robot, "a", "a_", *tasks["a_"]).start_all()
     a.listen_until(lambda: a.num_poses > NUM_FRAMES // 4, "poses")
@@ -170,10 +190,12 @@ def test_robots_come_and_go_and_come_again(start, tasks, alone):
     assert once_more.result() == alone["a_"]
 
 
-def test_tessera_run_takes_the_extractors_of_a_pool(start, tessera, sequence, reference_run):
+def test_tessera_run_takes_the_extractors_of_a_pool(start, tessera, sequence, reference_run) -> None:
     start(Pool, "pool")
     out = tessera.next_folder().with_name("with a pool")
-    tessera.command("run", f"kitti:{sequence}", "--extractors", 0, "--prefix", "a_", "--port", PORT, "--out", out).must_end_well()
+    tessera.command(
+        "run", f"kitti:{sequence}", "--extractors", 0, "--prefix", "a_", "--port", PORT, "--out", out
+    ).must_end_well()
     summary = json.loads((out / "summary.json").read_text())
     for key in ("frames", "frames_dropped", "trajectory_sha256", "map_sha256"):
         assert summary[key] == reference_run.summary[key], key

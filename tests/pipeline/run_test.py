@@ -18,9 +18,34 @@ from conftest import NUM_FRAMES, ROOT, RUN_TIMEOUT_S
 # All poses of the made sequence are known exactly; the room is 14 m wide.
 MAX_RMS_ERROR_M = 0.05
 SUMMARY_KEYS = {
-    "source", "sensor", "extractors", "tiles", "frames", "frames_tracked", "frames_lost", "frames_dropped", "tracking_failures",
-    "relocalizations", "keyframes", "landmarks", "loops_closed", "rms_error_m", "alignment", "wall_s", "frames_per_s", "pose_time_ms",
-    "latency_ms", "map_wait_ms", "stage_ms", "cpu_s", "max_rss_mb", "messages_repaired", "messages_lost", "trajectory_sha256", "map_sha256"}
+    "source",
+    "sensor",
+    "extractors",
+    "tiles",
+    "frames",
+    "frames_tracked",
+    "frames_lost",
+    "frames_dropped",
+    "tracking_failures",
+    "relocalizations",
+    "keyframes",
+    "landmarks",
+    "loops_closed",
+    "rms_error_m",
+    "alignment",
+    "wall_s",
+    "frames_per_s",
+    "pose_time_ms",
+    "latency_ms",
+    "map_wait_ms",
+    "stage_ms",
+    "cpu_s",
+    "max_rss_mb",
+    "messages_repaired",
+    "messages_lost",
+    "trajectory_sha256",
+    "map_sha256",
+}
 LOGPLAYER = ROOT / ".venv" / "bin" / "lcm-logplayer"
 
 
@@ -45,12 +70,14 @@ def pids_of(folder: Path, stage: str = "") -> list[int]:
             words = (entry / "cmdline").read_bytes().split(b"\0")
         except OSError:
             continue
-        if str(folder / "settings.yaml").encode() in words and Path(words[0].decode()).name.startswith(f"tessera-{stage}"):
+        if str(folder / "settings.yaml").encode() in words and Path(words[0].decode()).name.startswith(
+            f"tessera-{stage}"
+        ):
             found.append(int(entry.name))
     return found
 
 
-def test_a_run_ends_well(reference_run):
+def test_a_run_ends_well(reference_run) -> None:
     summary = reference_run.summary
     assert set(summary) >= SUMMARY_KEYS
     assert summary["frames"] == NUM_FRAMES
@@ -66,28 +93,41 @@ def test_a_run_ends_well(reference_run):
         assert summary["cpu_s"][name] > 0 and summary["max_rss_mb"][name] > 0
 
 
-def test_a_run_leaves_its_files(reference_run):
+def test_a_run_leaves_its_files(reference_run) -> None:
     files = {path.name for path in reference_run.folder.iterdir()}
-    assert files >= {"trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt", "keyframes.txt", "map.ply", "summary.json",
-                     "trajectory.png", "settings.yaml", "stages"}
+    assert files >= {
+        "trajectory.txt",
+        "trajectory_live.txt",
+        "trajectory_kitti.txt",
+        "keyframes.txt",
+        "map.ply",
+        "summary.json",
+        "trajectory.png",
+        "settings.yaml",
+        "stages",
+    }
     assert not [name for name in files if "unfinished" in name]
     assert len((reference_run.folder / "trajectory_kitti.txt").read_text().splitlines()) == NUM_FRAMES
     assert f"element vertex {reference_run.summary['landmarks']}\n" in (reference_run.folder / "map.ply").read_text()
-    assert (reference_run.folder / "trajectory.txt").read_text() != (reference_run.folder / "trajectory_live.txt").read_text()
+    assert (reference_run.folder / "trajectory.txt").read_text() != (
+        reference_run.folder / "trajectory_live.txt"
+    ).read_text()
 
 
-def test_evaluate_repeats_the_error_of_the_run(tessera, reference_run):
+def test_evaluate_repeats_the_error_of_the_run(tessera, reference_run) -> None:
     finished = tessera.command("evaluate", reference_run.folder).must_end_well()
     assert f"{reference_run.summary['rms_error_m']:.4f} m" in finished.out
 
 
-def test_cut_and_shared_out_gives_the_same(tessera, sequence, reference_run):
+def test_cut_and_shared_out_gives_the_same(tessera, sequence, reference_run) -> None:
     must_equal(tessera.run(f"kitti:{sequence}", "--extractors", 3, "--tiles", "2x4"), reference_run)
 
 
-def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, reference_run):
+def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, reference_run) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
-    run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
+    run = tessera.start(
+        "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
+    )
     poses = []
     bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
     bus.subscribe("POSE", lambda _channel, data: poses.append(data)).set_queue_capacity(1000)
@@ -102,9 +142,11 @@ def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, referenc
 
 
 @pytest.mark.parametrize("stage", ["camera", "dispatcher", "reassembler", "mapper", "evaluator"])
-def test_a_stage_that_is_killed_changes_nothing(tessera, sequence, reference_run, stage):
+def test_a_stage_that_is_killed_changes_nothing(tessera, sequence, reference_run, stage) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
-    run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
+    run = tessera.start(
+        "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
+    )
     poses = []
     bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
     bus.subscribe("POSE", lambda _channel, data: poses.append(data)).set_queue_capacity(1000)
@@ -119,18 +161,18 @@ def test_a_stage_that_is_killed_changes_nothing(tessera, sequence, reference_run
         assert summary[key] == reference_run.summary[key], key
 
 
-def test_a_tracker_that_is_killed_ends_the_run(tessera, sequence):
+def test_a_tracker_that_is_killed_ends_the_run(tessera, sequence) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
     os.kill(pids_of(folder, "tracker")[0], signal.SIGKILL)
     out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
     assert run.returncode == 1, out
-    assert f"tracker was killed by SIGKILL" in out
+    assert "tracker was killed by SIGKILL" in out
     assert not pids_of(folder)
 
 
-def test_a_mapper_of_lowest_priority_changes_nothing(tessera, sequence, reference_run):
+def test_a_mapper_of_lowest_priority_changes_nothing(tessera, sequence, reference_run) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "mapper"), "the mapper")
@@ -142,7 +184,7 @@ def test_a_mapper_of_lowest_priority_changes_nothing(tessera, sequence, referenc
         assert summary[key] == reference_run.summary[key], key
 
 
-def test_the_map_of_a_running_stack_is_the_mappers(tessera, sequence, reference_run, tmp_path):
+def test_the_map_of_a_running_stack_is_the_mappers(tessera, sequence, reference_run, tmp_path) -> None:
     """A listener that joins in the middle reaches the hash of the owner, and says it."""
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.2", "--port", port, "--out", folder)
@@ -164,24 +206,26 @@ def test_the_map_of_a_running_stack_is_the_mappers(tessera, sequence, reference_
     assert (tmp_path / "whole.ply").read_text() == (folder / "map.ply").read_text()
 
 
-def test_map_without_a_stack_is_refused(tessera, tmp_path):
+def test_map_without_a_stack_is_refused(tessera, tmp_path) -> None:
     finished = tessera.command("map", tmp_path / "none.ply", "--port", tessera.next_port())
     assert finished.status == 2, finished.out + finished.err
     assert "--port" in finished.err and finished.err.count("\n") == 1
 
 
-def test_a_live_run_is_replayed_as_it_went(tessera, sequence):
+def test_a_live_run_is_replayed_as_it_went(tessera, sequence) -> None:
     """Nobody waits for the mapper, and frames drop: what came of that depends on the machine, but can be repeated."""
     settings = ("--set", "dispatcher.max_queued_frames=1", "--set", "dispatcher.max_frames_in_flight=1")
     live = tessera.run(f"kitti:{sequence}", "--live", "--record", "--pace", "3", *settings).must_end_well()
-    replayed = tessera.run(live.folder / "run.lcmlog", "--extractors", 1, "--tiles", "2x2", command="replay").must_end_well()
+    replayed = tessera.run(
+        live.folder / "run.lcmlog", "--extractors", 1, "--tiles", "2x2", command="replay"
+    ).must_end_well()
     for key in ("frames_tracked", "frames_lost", "keyframes", "landmarks", "trajectory_sha256", "map_sha256"):
         assert replayed.summary[key] == live.summary[key], key
     assert (replayed.folder / "trajectory_live.txt").read_text() == (live.folder / "trajectory_live.txt").read_text()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_writes_what_it_has(tessera, sequence, number):
+def test_an_interrupted_run_writes_what_it_has(tessera, sequence, number) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.5", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -193,7 +237,7 @@ def test_an_interrupted_run_writes_what_it_has(tessera, sequence, number):
     assert not pids_of(folder)
 
 
-def test_no_stage_outlives_a_killed_launcher(tessera, sequence):
+def test_no_stage_outlives_a_killed_launcher(tessera, sequence) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -202,11 +246,13 @@ def test_no_stage_outlives_a_killed_launcher(tessera, sequence):
     wait_for(lambda: not pids_of(folder), "the end of all stages", timeout_s=10)
 
 
-def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence):
+def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     first = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
-    second = tessera.command("run", f"kitti:{sequence}", "--port", port, "--out", tessera.next_folder().with_name("second"))
+    second = tessera.command(
+        "run", f"kitti:{sequence}", "--port", port, "--out", tessera.next_folder().with_name("second")
+    )
     first.send_signal(signal.SIGTERM)
     out, _ = first.communicate(timeout=RUN_TIMEOUT_S)
     assert "another stack" not in out
@@ -214,7 +260,7 @@ def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence):
     assert "--port" in second.err
 
 
-def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tessera, sequence):
+def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tessera, sequence) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     first = tessera.start("run", f"kitti:{sequence}", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -233,18 +279,23 @@ def log(tessera, sequence, tmp_path_factory) -> Path:
     return log
 
 
-def test_a_recorded_log_is_replayed_to_the_same(tessera, log, reference_run):
+def test_a_recorded_log_is_replayed_to_the_same(tessera, log, reference_run) -> None:
     must_equal(tessera.run(log, "--extractors", 2, command="replay"), reference_run)
 
 
-def test_stock_lcm_logplayer_feeds_the_stack(tessera, log, reference_run):
+def test_stock_lcm_logplayer_feeds_the_stack(tessera, log, reference_run) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", "bus:", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
     line = ""
     while "waiting for frames" not in line:
         line = run.stdout.readline()
         assert line, "the stack ended before it was ready"
-    subprocess.run([LOGPLAYER, f"--lcm-url=udpm://239.255.76.67:{port}?ttl=0", log], check=True, capture_output=True, timeout=RUN_TIMEOUT_S)
+    subprocess.run(
+        [LOGPLAYER, f"--lcm-url=udpm://239.255.76.67:{port}?ttl=0", log],
+        check=True,
+        capture_output=True,
+        timeout=RUN_TIMEOUT_S,
+    )
     out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
     assert run.returncode == 0, out
     summary = json.loads((folder / "summary.json").read_text())
@@ -252,9 +303,9 @@ def test_stock_lcm_logplayer_feeds_the_stack(tessera, log, reference_run):
     assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
 
 
-def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path):
+def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path) -> None:
     cut = tmp_path / "cut.lcmlog"
-    cut.write_bytes(log.read_bytes()[:log.stat().st_size // 2])
+    cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     finished = tessera.run(cut, command="replay")
     assert finished.status == 2, finished.out + finished.err
     assert "cut.lcmlog" in finished.err and finished.err.count("\n") == 1
@@ -262,8 +313,27 @@ def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path):
 
 def publish_noise(port: int, generator: random.Random) -> None:
     """A hundred messages of random bytes on every channel of every bus, and datagrams that are no LCM at all."""
-    channels = ("CAMERA", "CALIBRATION", "GROUND_TRUTH", "END_OF_STREAM", "EXTRACTOR_READY", "TILE_ACK", "TILE_FEATURES", "FEATURES", "POSE",
-                "KEYFRAME", "MAP_DELTA", "MAP_SNAPSHOT", "MAP_REQUEST", "STATUS", "HEARTBEAT", "REPAIR", "TILE_0", "TILE_1", "UNKNOWN")
+    channels = (
+        "CAMERA",
+        "CALIBRATION",
+        "GROUND_TRUTH",
+        "END_OF_STREAM",
+        "EXTRACTOR_READY",
+        "TILE_ACK",
+        "TILE_FEATURES",
+        "FEATURES",
+        "POSE",
+        "KEYFRAME",
+        "MAP_DELTA",
+        "MAP_SNAPSHOT",
+        "MAP_REQUEST",
+        "STATUS",
+        "HEARTBEAT",
+        "REPAIR",
+        "TILE_0",
+        "TILE_1",
+        "UNKNOWN",
+    )
     buses = [lcm.LCM(f"udpm://239.255.76.67:{port + offset}?ttl=0") for offset in (0, 1, 2, 13, 14)]
     raw = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for _ in range(100):
@@ -274,9 +344,11 @@ def publish_noise(port: int, generator: random.Random) -> None:
         time.sleep(0.005)
 
 
-def test_random_bytes_on_every_channel_are_counted_and_change_nothing(tessera, sequence, reference_run):
+def test_random_bytes_on_every_channel_are_counted_and_change_nothing(tessera, sequence, reference_run) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
-    run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
+    run = tessera.start(
+        "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
+    )
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
     publish_noise(port, random.Random(1))
     out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
@@ -286,14 +358,14 @@ def test_random_bytes_on_every_channel_are_counted_and_change_nothing(tessera, s
     assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
 
 
-def test_stereo_is_the_same_for_every_cut(tessera, sequence):
+def test_stereo_is_the_same_for_every_cut(tessera, sequence) -> None:
     whole = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--extractors", 1).must_end_well()
     assert whole.summary["frames_tracked"] == NUM_FRAMES
     assert whole.summary["rms_error_m"] < MAX_RMS_ERROR_M
     must_equal(tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--extractors", 2, "--tiles", "2x2"), whole)
 
 
-def test_frames_choose_a_part(tessera, sequence):
+def test_frames_choose_a_part(tessera, sequence) -> None:
     finished = tessera.run(f"kitti:{sequence}", "--frames", "0:20").must_end_well()
     assert finished.summary["frames"] == 20
 
@@ -310,23 +382,23 @@ class TestDamagedInput:
         assert finished.status == 2, finished.out + finished.err
         assert word in finished.err and finished.err.count("\n") == 1, finished.err
 
-    def test_no_calibration(self, tessera, damaged):
+    def test_no_calibration(self, tessera, damaged) -> None:
         (damaged / "calib.txt").unlink()
         self.must_be_refused(tessera, damaged, "calib.txt")
 
-    def test_malformed_calibration(self, tessera, damaged):
+    def test_malformed_calibration(self, tessera, damaged) -> None:
         (damaged / "calib.txt").write_text("P0: 300 zero\n")
         self.must_be_refused(tessera, damaged, "calib.txt")
 
-    def test_too_few_times(self, tessera, damaged):
+    def test_too_few_times(self, tessera, damaged) -> None:
         (damaged / "times.txt").write_text("0.0\n0.1\n")
         self.must_be_refused(tessera, damaged, "times.txt")
 
-    def test_truncated_image(self, tessera, damaged):
+    def test_truncated_image(self, tessera, damaged) -> None:
         image = damaged / "image_0" / "000030.pgm"
         image.write_bytes(image.read_bytes()[:1000])
         self.must_be_refused(tessera, damaged, "000030.pgm")
 
-    def test_image_of_another_size(self, tessera, damaged):
+    def test_image_of_another_size(self, tessera, damaged) -> None:
         (damaged / "image_0" / "000030.pgm").write_bytes(b"P5 10 10 255\n" + bytes(100))
         self.must_be_refused(tessera, damaged, "000030.pgm")

@@ -46,10 +46,16 @@ def make_texture(generator: np.random.Generator) -> np.ndarray:
 
 def make_walls() -> list[Wall]:
     generator = np.random.default_rng(2)
-    walls = [Wall(axis, bound[axis], ROOM_LOW, ROOM_HIGH, make_texture(generator))
-             for axis in range(3) for bound in (ROOM_LOW, ROOM_HIGH)]
-    walls += [Wall(axis, bound[axis], PILLAR_LOW, PILLAR_HIGH, make_texture(generator))
-              for axis in (0, 2) for bound in (PILLAR_LOW, PILLAR_HIGH)]
+    walls = [
+        Wall(axis, bound[axis], ROOM_LOW, ROOM_HIGH, make_texture(generator))
+        for axis in range(3)
+        for bound in (ROOM_LOW, ROOM_HIGH)
+    ]
+    walls += [
+        Wall(axis, bound[axis], PILLAR_LOW, PILLAR_HIGH, make_texture(generator))
+        for axis in (0, 2)
+        for bound in (PILLAR_LOW, PILLAR_HIGH)
+    ]
     return walls
 
 
@@ -58,8 +64,9 @@ def sample(texture: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     left, top = np.floor(u).astype(int), np.floor(v).astype(int)
     du, dv = u - left, v - top
     columns, rows = (left % TEXTURE_SIZE, (left + 1) % TEXTURE_SIZE), (top % TEXTURE_SIZE, (top + 1) % TEXTURE_SIZE)
-    return ((1 - dv) * ((1 - du) * texture[rows[0], columns[0]] + du * texture[rows[0], columns[1]])
-            + dv * ((1 - du) * texture[rows[1], columns[0]] + du * texture[rows[1], columns[1]]))
+    return (1 - dv) * ((1 - du) * texture[rows[0], columns[0]] + du * texture[rows[0], columns[1]]) + dv * (
+        (1 - du) * texture[rows[1], columns[0]] + du * texture[rows[1], columns[1]]
+    )
 
 
 def render(walls: list[Wall], world_from_camera: np.ndarray) -> np.ndarray:
@@ -75,7 +82,9 @@ def render(walls: list[Wall], world_from_camera: np.ndarray) -> np.ndarray:
             depth = (wall.position_m - origin[wall.axis]) / rays[..., wall.axis]
             points = origin + depth[..., None] * rays
         others = [axis for axis in range(3) if axis != wall.axis]
-        inside = np.all([(points[..., axis] >= wall.low[axis]) & (points[..., axis] <= wall.high[axis]) for axis in others], axis=0)
+        inside = np.all(
+            [(points[..., axis] >= wall.low[axis]) & (points[..., axis] <= wall.high[axis]) for axis in others], axis=0
+        )
         seen = inside & (depth > 0.05) & (depth < nearest)
         nearest[seen] = depth[seen]
         u, v = (points[seen][:, axis] * TEXELS_PER_M for axis in others)
@@ -109,5 +118,7 @@ def write_sequence(folder: Path, num_frames: int) -> Path:
     left = f"{FOCAL_PX} 0 {CENTER_PX[0]} {{}} 0 {FOCAL_PX} {CENTER_PX[1]} 0 0 0 1 0"
     (folder / "calib.txt").write_text(f"P0: {left.format(0)}\nP1: {left.format(-FOCAL_PX * BASELINE_M)}\n")
     (folder / "times.txt").write_text("".join(f"{FRAME_PERIOD_S * frame:.6f}\n" for frame in range(num_frames)))
-    (folder / "poses.txt").write_text("".join(" ".join(f"{value:.9f}" for value in pose.ravel()) + "\n" for pose in poses))
+    (folder / "poses.txt").write_text(
+        "".join(" ".join(f"{value:.9f}" for value in pose.ravel()) + "\n" for pose in poses)
+    )
     return folder

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tessera_cli.runs.run_folder import Result
 from tessera_cli.report.terminal_plot import draw_from_above
+from tessera_cli.runs.run_folder import Result
 from tessera_cli.runs.trajectories import Trajectory, absolute_error
 
 
@@ -18,7 +18,7 @@ def picture_of(corners, columns=20, lines=10) -> list[str]:
     return draw_from_above(Result("path", path_through(corners)), columns, lines, colored=False).splitlines()
 
 
-def test_a_square_is_closed_and_empty_inside():
+def test_a_square_is_closed_and_empty_inside() -> None:
     lines = picture_of([(0, 0), (0, 10), (10, 10), (10, 0), (0, 0)])
     assert len(lines) == 10 and all(len(line) == 20 for line in lines)  # a character is twice as high as wide
     blank = chr(0x2800)
@@ -26,7 +26,7 @@ def test_a_square_is_closed_and_empty_inside():
     assert all(set(line[1:-1]) == {blank} for line in lines[1:-1])
 
 
-def test_up_is_up():
+def test_up_is_up() -> None:
     """An L: its foot is on the last line."""
     lines = picture_of([(0, 10), (0, 0), (6, 0)])
     blank = chr(0x2800)
@@ -34,12 +34,12 @@ def test_up_is_up():
 
 
 @pytest.mark.parametrize("columns, lines", [(10, 30), (60, 5), (1, 1)])
-def test_it_stays_within_its_room(columns, lines):
+def test_it_stays_within_its_room(columns, lines) -> None:
     picture = picture_of([(0, 0), (3, 7), (11, 2)], columns, lines)
     assert len(picture) <= lines and max(len(line) for line in picture) <= columns
 
 
-def test_truth_and_estimate_have_colours_of_their_own():
+def test_truth_and_estimate_have_colours_of_their_own() -> None:
     truth = path_through([(0, 0), (0, 10), (10, 10), (10, 0)])
     estimate = path_through([(0, 0), (0, 10), (10, 10), (14, 0)])
     result = Result("path", estimate, error=absolute_error(estimate, truth, with_scale=False), truth=truth)

@@ -17,56 +17,68 @@ def make_path(num_poses: int = 50) -> Trajectory:
 def moved(path: Trajectory, scale: float) -> Trajectory:
     """The same path in another world frame and another unit."""
     turn = Rotation.from_euler("xyz", [0.3, -1.0, 2.0])
-    return Trajectory(path.timestamps_s, scale * turn.apply(path.positions) + [5.0, -3.0, 1.0],
-                      (turn * Rotation.from_quat(path.quaternions_xyzw)).as_quat(), path.has_times)
+    return Trajectory(
+        path.timestamps_s,
+        scale * turn.apply(path.positions) + [5.0, -3.0, 1.0],
+        (turn * Rotation.from_quat(path.quaternions_xyzw)).as_quat(),
+        path.has_times,
+    )
 
 
 @pytest.mark.parametrize("scale, with_scale", [(1.0, False), (1.0, True), (0.2, True)])
-def test_alignment_takes_the_world_frame_away(scale, with_scale):
+def test_alignment_takes_the_world_frame_away(scale, with_scale) -> None:
     error = absolute_error(moved(make_path(), scale), make_path(), with_scale)
     assert error.rms_m < 1e-9
     assert error.scale == pytest.approx(1.0 / scale)
 
 
-def test_scale_is_kept_by_se3():
+def test_scale_is_kept_by_se3() -> None:
     error = absolute_error(moved(make_path(), 0.2), make_path(), with_scale=False)
     assert error.scale == 1.0
     assert error.rms_m > 0.1
 
 
-def test_only_poses_with_a_truth_count():
+def test_only_poses_with_a_truth_count() -> None:
     truth = make_path()
-    some = Trajectory(*(values[10:40:3] for values in (truth.timestamps_s, truth.positions, truth.quaternions_xyzw)), has_times=True)
+    some = Trajectory(
+        *(values[10:40:3] for values in (truth.timestamps_s, truth.positions, truth.quaternions_xyzw)), has_times=True
+    )
     error = absolute_error(some, truth, with_scale=False)
     assert len(error.errors_m) == 10
     assert error.rms_m < 1e-9
 
 
-def test_known_noise_is_measured():
+def test_known_noise_is_measured() -> None:
     truth = make_path()
     noise = np.random.default_rng(1).normal(0.0, 0.01, truth.positions.shape)
-    error = absolute_error(Trajectory(truth.timestamps_s, truth.positions + noise, truth.quaternions_xyzw, True), truth, False)
+    error = absolute_error(
+        Trajectory(truth.timestamps_s, truth.positions + noise, truth.quaternions_xyzw, True), truth, False
+    )
     assert error.rms_m == pytest.approx(0.01 * np.sqrt(3), rel=0.15)
 
 
 @pytest.mark.parametrize("positions", [np.zeros((5, 3)), np.outer(np.arange(5), [1, 0, 0])])
-def test_a_path_that_fixes_no_alignment_is_refused(positions):
+def test_a_path_that_fixes_no_alignment_is_refused(positions) -> None:
     path = Trajectory(np.arange(5.0), positions.astype(float), np.tile([0.0, 0, 0, 1], (5, 1)), True)
     with pytest.raises(UserError):
         absolute_error(path, path, with_scale=True)
 
 
-def test_paths_of_different_times_are_refused():
+def test_paths_of_different_times_are_refused() -> None:
     path = make_path()
     with pytest.raises(UserError, match="same time"):
         absolute_error(Trajectory(path.timestamps_s + 1000.0, path.positions, path.quaternions_xyzw, True), path, False)
 
 
-def test_files_of_both_formats_are_read(tmp_path):
+def test_files_of_both_formats_are_read(tmp_path) -> None:
     path = make_path()
     tum, kitti = tmp_path / "tum.txt", tmp_path / "kitti.txt"
-    np.savetxt(tum, np.column_stack([path.timestamps_s, path.positions, path.quaternions_xyzw]), header="timestamp tx ...")
-    matrices = np.concatenate([Rotation.from_quat(path.quaternions_xyzw).as_matrix(), path.positions[..., None]], axis=2)
+    np.savetxt(
+        tum, np.column_stack([path.timestamps_s, path.positions, path.quaternions_xyzw]), header="timestamp tx ..."
+    )
+    matrices = np.concatenate(
+        [Rotation.from_quat(path.quaternions_xyzw).as_matrix(), path.positions[..., None]], axis=2
+    )
     np.savetxt(kitti, matrices.reshape(-1, 12))
     for file, has_times in ((tum, True), (kitti, False)):
         read = read_trajectory(file)
@@ -77,9 +89,16 @@ def test_files_of_both_formats_are_read(tmp_path):
         absolute_error(read_trajectory(tum), read_trajectory(kitti), with_scale=False)
 
 
-@pytest.mark.parametrize("text, words", [
-    ("", "no pose"), ("1 2 3\n", "8 numbers"), ("1 2 3 4 5 6 7 8\nx 2 3 4 5 6 7 8\n", ":2:"), ("nan 2 3 4 5 6 7 8\n", "finite")])
-def test_a_file_that_makes_no_sense_is_refused(tmp_path, text, words):
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("", "no pose"),
+        ("1 2 3\n", "8 numbers"),
+        ("1 2 3 4 5 6 7 8\nx 2 3 4 5 6 7 8\n", ":2:"),
+        ("nan 2 3 4 5 6 7 8\n", "finite"),
+    ],
+)
+def test_a_file_that_makes_no_sense_is_refused(tmp_path, text, words) -> None:
     file = tmp_path / "trajectory.txt"
     file.write_text(text)
     with pytest.raises(UserError, match=words):

@@ -10,30 +10,35 @@ def must_refuse(finished, *words: str) -> None:
         assert word in finished.err
 
 
-def test_trains_on_a_source_and_a_folder(tessera, sequence, tmp_path):
+def test_trains_on_a_source_and_a_folder(tessera, sequence, tmp_path) -> None:
     files = [tmp_path / "a.tvoc", tmp_path / "b.tvoc"]
     photos = next(path.parent for path in sorted(sequence.rglob("*")) if path.suffix == ".pgm")
     for file in files:
-        tessera.command("vocabulary", "train", file, f"kitti:{sequence}", photos, "--every", 20, "--views", 1, "--levels", 2).must_end_well()
+        tessera.command(
+            "vocabulary", "train", file, f"kitti:{sequence}", photos, "--every", 20, "--views", 1, "--levels", 2
+        ).must_end_well()
     assert files[0].read_bytes() == files[1].read_bytes()
     told = tessera.command("vocabulary", "info", files[0]).must_end_well().out
     assert "words 100," in told
     assert "trained on" in told
 
 
-@pytest.mark.parametrize("arguments, word", [
-    (["train", "/tmp/v.tvoc", "/no/such/folder"], "/no/such/folder"),
-    (["train", "/tmp/v.tvoc", "camera:0"], "camera:0"),
-    (["train", "/no/such/folder/v.tvoc", "sim:room"], "/no/such/folder"),
-    (["train", "/tmp/v.tvoc", "sim:nowhere"], "nowhere"),
-    (["train", "/tmp/v.tvoc", "sim:room", "--levels", "0"], "--levels"),
-    (["info", "/no/such/file.tvoc"], "/no/such/file.tvoc"),
-    (["info", __file__], "not a vocabulary"),
-    ([], "train|info"),
-])
-def test_refuses(tessera, arguments, word):
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["train", "/tmp/v.tvoc", "/no/such/folder"], "/no/such/folder"),
+        (["train", "/tmp/v.tvoc", "camera:0"], "camera:0"),
+        (["train", "/no/such/folder/v.tvoc", "sim:room"], "/no/such/folder"),
+        (["train", "/tmp/v.tvoc", "sim:nowhere"], "nowhere"),
+        (["train", "/tmp/v.tvoc", "sim:room", "--levels", "0"], "--levels"),
+        (["info", "/no/such/file.tvoc"], "/no/such/file.tvoc"),
+        (["info", __file__], "not a vocabulary"),
+        ([], "train|info"),
+    ],
+)
+def test_refuses(tessera, arguments, word) -> None:
     must_refuse(tessera.command("vocabulary", *arguments), word)
 
 
-def test_refuses_a_folder_without_photos(tessera, tmp_path):
+def test_refuses_a_folder_without_photos(tessera, tmp_path) -> None:
     must_refuse(tessera.command("vocabulary", "train", tmp_path / "v.tvoc", tmp_path), "no image")

@@ -11,11 +11,21 @@ from pathlib import Path
 
 import pytest
 
-from deputies import ROOT, environment, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
-from tessera_cli.errors import UserError
 from tessera_cli.cluster import deploy
 from tessera_cli.cluster.keys import KeyRing, to_text
-from tessera_cli.cluster.node_facts import Here, NodeFacts, obstacles, own_key_name, parse_facts, read_packages, remarks, shortcomings
+from tessera_cli.cluster.node_facts import (
+    Here,
+    NodeFacts,
+    obstacles,
+    own_key_name,
+    parse_facts,
+    read_packages,
+    remarks,
+    shortcomings,
+)
+from tessera_cli.errors import UserError
+
+from deputies import ROOT, environment, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 
 TOLD = """host board1
 architecture aarch64
@@ -40,7 +50,7 @@ def sentences(faults) -> str:
     return "; ".join(fault.sentence for fault in faults)
 
 
-def test_a_node_that_has_all_is_ready():
+def test_a_node_that_has_all_is_ready() -> None:
     facts = parse_facts(TOLD)
     assert facts.deployed == ["CMakeLists.txt"] and facts.rmem_max == 212992
     assert obstacles(facts, HERE, True) == [] and shortcomings(facts, HERE) == []
@@ -48,62 +58,77 @@ def test_a_node_that_has_all_is_ready():
     assert "net.core.rmem_max=4194304" in small and "its OpenCV is 4.6.0 and this machine's 4.10.0" in other
 
 
-@pytest.mark.parametrize("line, other, words", [
-    ("package cmake", "", "packages are missing: cmake"),
-    ("0123abcd", "4567", ".venv is of other packages"),
-    ("build current", "build old", "older than its sources"),
-    ("build current", "", "it has no build"),
-    ("build current", "build current\nlibrary liblcm.so.1", "don't find liblcm.so.1"),
-    ("route 000000E0 000000F0", "route 0000A8C0 00FFFFFF", "no route for multicast"),
-    ("trusted me AAAA", "trusted other BBBB", "procman/tessera keys trust me@base AAAA"),
-])
-def test_each_thing_that_is_missing_is_named(line, other, words):
+@pytest.mark.parametrize(
+    "line, other, words",
+    [
+        ("package cmake", "", "packages are missing: cmake"),
+        ("0123abcd", "4567", ".venv is of other packages"),
+        ("build current", "build old", "older than its sources"),
+        ("build current", "", "it has no build"),
+        ("build current", "build current\nlibrary liblcm.so.1", "don't find liblcm.so.1"),
+        ("route 000000E0 000000F0", "route 0000A8C0 00FFFFFF", "no route for multicast"),
+        ("trusted me AAAA", "trusted other BBBB", "procman/tessera keys trust me@base AAAA"),
+    ],
+)
+def test_each_thing_that_is_missing_is_named(line, other, words) -> None:
     found = shortcomings(parse_facts(TOLD.replace(line, other)), HERE)
     assert len(found) == 1 and words in found[0].sentence
 
 
-@pytest.mark.parametrize("line, other, is_built, words", [
-    ("aarch64", "riscv64", False, "Tessera is built for x86_64 and aarch64"),
-    ("aarch64", "x86_64", True, "its CPU is x86_64 and this machine's aarch64: deploy without --built, and build there"),
-    ("flags fp asimd\n", "", False, ""),
-    ("debian 12", "ubuntu 24.04", True, "its system is ubuntu 24.04 and this machine's debian 12"),
-    ("program rsync", "", False, "sudo apt-get install rsync"),
-    ("program apt-get", "", False, "no apt-get"),
-    ("build current", "git yes", False, "/home/pi/tessera is a git checkout"),
-])
-def test_what_keeps_anything_from_being_copied_is_named(line, other, is_built, words):
+@pytest.mark.parametrize(
+    "line, other, is_built, words",
+    [
+        ("aarch64", "riscv64", False, "Tessera is built for x86_64 and aarch64"),
+        (
+            "aarch64",
+            "x86_64",
+            True,
+            "its CPU is x86_64 and this machine's aarch64: deploy without --built, and build there",
+        ),
+        ("flags fp asimd\n", "", False, ""),
+        ("debian 12", "ubuntu 24.04", True, "its system is ubuntu 24.04 and this machine's debian 12"),
+        ("program rsync", "", False, "sudo apt-get install rsync"),
+        ("program apt-get", "", False, "no apt-get"),
+        ("build current", "git yes", False, "/home/pi/tessera is a git checkout"),
+    ],
+)
+def test_what_keeps_anything_from_being_copied_is_named(line, other, is_built, words) -> None:
     found = sentences(obstacles(parse_facts(TOLD.replace(line, other)), HERE, is_built))
     assert words in found and bool(found) == bool(words)
 
 
-def test_an_old_cpu_is_told():
+def test_an_old_cpu_is_told() -> None:
     facts = NodeFacts(architecture="x86_64", flags={"avx2", "fma"}, programs={"rsync", "apt-get"})
     assert sentences(obstacles(facts, HERE, False)) == "its CPU lacks bmi2: Tessera needs x86-64-v3"
 
 
-def test_lines_that_make_no_sense_are_left_out():
+def test_lines_that_make_no_sense_are_left_out() -> None:
     facts = parse_facts("rmem_max lots\nroute 1\nversions {\nversions 3\ntrusted x\nnonsense\n\n\x00")
     assert facts == NodeFacts()
 
 
-@pytest.mark.parametrize("text", ["", "-oProxyCommand=x", "a b", "node:~/x", "node:../x", "node:/", "node:.", "node:$(x)", "@node"])
-def test_what_is_no_node_is_refused(text):
+@pytest.mark.parametrize(
+    "text", ["", "-oProxyCommand=x", "a b", "node:~/x", "node:../x", "node:/", "node:.", "node:$(x)", "@node"]
+)
+def test_what_is_no_node_is_refused(text) -> None:
     with pytest.raises(UserError, match="is no node"):
         deploy.parse_node(text)
 
 
-def test_nodes_are_read():
-    assert [(node.login, node.folder) for node in map(deploy.parse_node, ("pi@board1", "10.0.0.2:/opt/tessera/", "n:work/t"))] == [
-        ("pi@board1", "tessera"), ("10.0.0.2", "/opt/tessera"), ("n", "work/t")]
+def test_nodes_are_read() -> None:
+    assert [
+        (node.login, node.folder)
+        for node in map(deploy.parse_node, ("pi@board1", "10.0.0.2:/opt/tessera/", "n:work/t"))
+    ] == [("pi@board1", "tessera"), ("10.0.0.2", "/opt/tessera"), ("n", "work/t")]
 
 
-def test_what_an_earlier_deploy_brought_and_is_no_more_goes_but_nothing_outside():
+def test_what_an_earlier_deploy_brought_and_is_no_more_goes_but_nothing_outside() -> None:
     deployed = ["a.cc", "old.cc", "../../etc/passwd", "/etc/passwd", "x/../../y", "build/.prebuilt"]
     assert deploy.obsolete_files(deployed, ["a.cc"], False) == ["old.cc", "build/.prebuilt"]
     assert deploy.obsolete_files(deployed, ["a.cc"], True) == ["old.cc"]
 
 
-def test_packages_are_those_of_the_list():
+def test_packages_are_those_of_the_list() -> None:
     packages = read_packages(ROOT / "procman" / "packages.txt")
     assert "cmake" in packages and all(" " not in name and "#" not in name for name in packages)
 
@@ -111,7 +136,7 @@ def test_packages_are_those_of_the_list():
 class Sshd:
     """On loopback, with keys of its own; what it is asked for is done as the user of the test."""
 
-    def __init__(self, folder: Path, keys: Path):
+    def __init__(self, folder: Path, keys: Path) -> None:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self._port = free.getsockname()[1]
@@ -120,16 +145,24 @@ class Sshd:
         shutil.copy(folder / "user.pub", folder / "authorized")
         (folder / "config").write_text(
             f"Port {self._port}\nListenAddress 127.0.0.1\nHostKey {folder / 'host'}\nAuthorizedKeysFile {folder / 'authorized'}\n"
-            f'StrictModes no\nUsePAM no\nPidFile none\nPasswordAuthentication no\nSetEnv TESSERA_KEYS="{keys}"\n')
+            f'StrictModes no\nUsePAM no\nPidFile none\nPasswordAuthentication no\nSetEnv TESSERA_KEYS="{keys}"\n'
+        )
         if os.geteuid() == 0:
             Path("/run/sshd").mkdir(exist_ok=True)
-        self._process = subprocess.Popen([shutil.which("sshd", path=SSHD_PATH), "-D", "-e", "-f", folder / "config"], stderr=subprocess.DEVNULL)
-        self.command = (f"ssh -p {self._port} -i {folder / 'user'} -o IdentitiesOnly=yes -o StrictHostKeyChecking=no -o LogLevel=ERROR "
-                        f"-o UserKnownHostsFile={folder / 'known'} -F none")
+        self._process = subprocess.Popen(
+            [shutil.which("sshd", path=SSHD_PATH), "-D", "-e", "-f", folder / "config"], stderr=subprocess.DEVNULL
+        )
+        self.command = (
+            f"ssh -p {self._port} -i {folder / 'user'} -o IdentitiesOnly=yes -o StrictHostKeyChecking=no -o LogLevel=ERROR "
+            f"-o UserKnownHostsFile={folder / 'known'} -F none"
+        )
         wait_for(self._answers, "the sshd")
 
     def _answers(self) -> bool:
-        return subprocess.run([*self.command.split(), "127.0.0.1", "true"], capture_output=True).returncode == 0 or self._process.poll() is not None
+        return (
+            subprocess.run([*self.command.split(), "127.0.0.1", "true"], capture_output=True).returncode == 0
+            or self._process.poll() is not None
+        )
 
     def end(self) -> None:
         self._process.terminate()
@@ -150,21 +183,33 @@ def node(tmp_path):
     folder = tmp_path / "node"
 
     def run(*options) -> subprocess.CompletedProcess:
-        return subprocess.run([sys.executable, "-m", "tessera_cli", "deploy", f"127.0.0.1:{folder}", "--ssh", sshd.command, *options],
-                              env=environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+        return subprocess.run(
+            [sys.executable, "-m", "tessera_cli", "deploy", f"127.0.0.1:{folder}", "--ssh", sshd.command, *options],
+            env=environment(),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
 
     yield Namespace(deploy=run, folder=folder, keys=tmp_path / "keys of the node")
     sshd.end()
 
 
-def test_sources_are_copied_once_and_what_is_missing_is_told(node, own_keys):
+def test_sources_are_copied_once_and_what_is_missing_is_told(node, own_keys) -> None:
     looked = node.deploy("--dry-run")
-    assert looked.returncode == 1 and "files would be copied" in looked.stdout and not node.folder.exists(), looked.stderr
+    assert looked.returncode == 1 and "files would be copied" in looked.stdout and not node.folder.exists(), (
+        looked.stderr
+    )
     first = node.deploy()
     assert first.returncode == 1, first.stderr
     ring = KeyRing(own_keys)
     own_key = to_text(ring.signing_key().verify_key.encode())
-    for words in ("no Python environment", "no build", f"procman/tessera keys trust {own_key_name(getpass.getuser(), os.uname().nodename)} {own_key}"):
+    for words in (
+        "no Python environment",
+        "no build",
+        f"procman/tessera keys trust {own_key_name(getpass.getuser(), os.uname().nodename)} {own_key}",
+    ):
         assert words in first.stdout
     listed = (node.folder / ".tessera-deployed").read_text().split()
     assert all((node.folder / name).read_bytes() == (ROOT / name).read_bytes() for name in listed)
@@ -176,11 +221,15 @@ def test_sources_are_copied_once_and_what_is_missing_is_told(node, own_keys):
     (node.folder / "old.cc").write_text("no longer there")
     (node.folder / "own.txt").write_text("the node's own")
     second = node.deploy()
-    assert f"1 of {len(listed)} files copied" in second.stdout and "1 removed" in second.stdout and "keys trust" not in second.stdout
+    assert (
+        f"1 of {len(listed)} files copied" in second.stdout
+        and "1 removed" in second.stdout
+        and "keys trust" not in second.stdout
+    )
     assert not (node.folder / "old.cc").exists() and (node.folder / "own.txt").exists()
 
 
-def test_a_build_is_old_when_a_source_is_newer(node):
+def test_a_build_is_old_when_a_source_is_newer(node) -> None:
     node.deploy()
     (node.folder / "build").mkdir()
     (node.folder / "build" / ".built").touch()
@@ -191,19 +240,32 @@ def test_a_build_is_old_when_a_source_is_newer(node):
         assert "its build is older than its sources" in node.deploy().stdout
 
 
-def test_a_built_tree_runs_where_it_was_copied_to(node):
+def test_a_built_tree_runs_where_it_was_copied_to(node) -> None:
     if not (ROOT / "build" / "bin" / "tessera-tracker").exists() or not (ROOT / ".venv").is_dir():
         pytest.skip("the stages are not built: procman/tessera setup builds them")
     finished = node.deploy("--built")
-    assert finished.returncode == 1 and "no build" not in finished.stdout and (node.folder / "build" / ".prebuilt").exists(), finished.stdout
+    assert (
+        finished.returncode == 1
+        and "no build" not in finished.stdout
+        and (node.folder / "build" / ".prebuilt").exists()
+    ), finished.stdout
     (node.folder / ".venv").symlink_to(ROOT / ".venv")  # what setup would make
     told = subprocess.run([node.folder / "build" / "bin" / "tessera-tracker", "--help"], capture_output=True, text=True)
     assert told.returncode == 0, told.stderr
     node.deploy()
-    assert not (node.folder / "build" / ".prebuilt").exists() and not (node.folder / "build" / "bin" / "tessera-tracker").exists()
+    assert (
+        not (node.folder / "build" / ".prebuilt").exists()
+        and not (node.folder / "build" / "bin" / "tessera-tracker").exists()
+    )
 
 
-def test_nodes_that_cannot_be_reached_are_told(node):
-    finished = subprocess.run([sys.executable, "-m", "tessera_cli", "deploy", "127.0.0.1", "--ssh", "ssh -p 1"], env=environment(),
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+def test_nodes_that_cannot_be_reached_are_told(node) -> None:
+    finished = subprocess.run(
+        [sys.executable, "-m", "tessera_cli", "deploy", "127.0.0.1", "--ssh", "ssh -p 1"],
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert finished.returncode == 1 and "127.0.0.1: can not be reached: " in finished.stdout

@@ -30,7 +30,15 @@ FIRST_PORT = 61000 + (os.getpid() % 7) * 20 * PORTS_PER_NODE
 class Node:
     """A deputy with an id, a port and a folder, and whoever orders it from the same node. `prefix`: words before each command."""
 
-    def __init__(self, folder: Path, port: int, commands: str = "", deputy: str = "node1", prefix: tuple = (), is_lan: bool = False):
+    def __init__(
+        self,
+        folder: Path,
+        port: int,
+        commands: str = "",
+        deputy: str = "node1",
+        prefix: tuple = (),
+        is_lan: bool = False,
+    ) -> None:
         self.folder, self.port, self.deputy = folder, port, deputy
         self._prefix, self._lan = prefix, ["--lan"] if is_lan else []
         self.commands_path = ROOT / "procman" / "commands.pmd"
@@ -40,12 +48,28 @@ class Node:
         self.process: subprocess.Popen | None = None
 
     def line(self, *words) -> list[str]:
-        return [*self._prefix, sys.executable, "-m", "tessera_cli", *map(str, words), "--port", str(self.port), *self._lan]
+        return [
+            *self._prefix,
+            sys.executable,
+            "-m",
+            "tessera_cli",
+            *map(str, words),
+            "--port",
+            str(self.port),
+            *self._lan,
+        ]
 
     def start(self) -> "Node":
         self.process = subprocess.Popen(
-            self.line("deputy", "--id", self.deputy, "--folder", self.folder / "state", "--commands", self.commands_path),
-            env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            self.line(
+                "deputy", "--id", self.deputy, "--folder", self.folder / "state", "--commands", self.commands_path
+            ),
+            env=environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         self.process.stdout.readline()  # it says that it is there
         return self
 
@@ -63,8 +87,14 @@ class Node:
         return marked(f"{self.folder / 'state'}/")
 
     def command(self, *arguments) -> subprocess.CompletedProcess:
-        return subprocess.run(self.line(*arguments), env=environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                              timeout=TIMEOUT_S)
+        return subprocess.run(
+            self.line(*arguments),
+            env=environment(),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
+        )
 
     def up(self, text: str, *options, name: str = "list") -> subprocess.CompletedProcess:
         path = self.folder / f"{name}.pmd"
@@ -102,7 +132,9 @@ def make_node(tmp_path, own_keys):
         next_node[0] += 1
         folder = tmp_path / f"node {len(nodes)}"
         folder.mkdir()
-        nodes.append(Node(folder, options.pop("port", FIRST_PORT + PORTS_PER_NODE * (next_node[0] % 20)), commands, **options))
+        nodes.append(
+            Node(folder, options.pop("port", FIRST_PORT + PORTS_PER_NODE * (next_node[0] % 20)), commands, **options)
+        )
         return nodes[-1]
 
     yield make

@@ -9,14 +9,15 @@ import subprocess
 import lcm
 from nacl.signing import SigningKey
 
+from tessera_cli.cluster.keys import KeyRing, to_text
+from tessera_cli.messages import procman_order_t, procman_status_t
+from tessera_cli.settings import GROUP
+from tessera_cli.supervision.orders import Gate, sign
+
 from deputies import environment, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 from orders_test import KEY, bad_order
-from tessera_cli.cluster.keys import KeyRing, to_text
-from tessera_cli.supervision.orders import Gate, sign
-from tessera_cli.settings import GROUP
-from tessera_cli.messages import procman_order_t, procman_status_t
 
-COMMANDS = '''
+COMMANDS = """
 cmd "sleeper"   { exec = "sleep 1000"; }
 cmd "family"    { exec = "sh -c 'setsid sleep 1001 & trap \\"\\" TERM; sleep 1002; wait'"; }
 cmd "talker"    { exec = "sh -c 'echo I am ${name}; echo number ${id} >&2; exec sleep 1000'"; }
@@ -24,19 +25,23 @@ cmd "oneshot"   { exec = "true"; }
 cmd "faulty"    { exec = "sh -c 'echo the disk is missing; exit 3'"; }
 cmd "absent"    { exec = "/no/such/program"; }
 cmd "glutton"   { exec = "python3 -c 'x = bytearray(200_000_000); import time; time.sleep(1000)'"; }
-'''
+"""
 
 
 def listed(*names: str, host: str = "node1", more: str = "") -> str:
     return "".join(f'cmd "{name}" {{ host = "{host}"; ready = "started"; {more} }}\n' for name in names)
 
 
-def test_up_starts_status_shows_log_tells_and_down_ends(make_node):
+def test_up_starts_status_shows_log_tells_and_down_ends(make_node) -> None:
     node = make_node(COMMANDS).start()
     up = node.up('cmd "talker" { host = "node1"; count = 2; ready = "started"; }' + listed("sleeper"))
     assert up.returncode == 0 and "3 processes on 1 nodes are ready" in up.stdout, up.stderr
     processes = node.processes()
-    assert {name: process["state"] for name, process in processes.items()} == {"talker_0": "ready", "talker_1": "ready", "sleeper": "ready"}
+    assert {name: process["state"] for name, process in processes.items()} == {
+        "talker_0": "ready",
+        "talker_1": "ready",
+        "sleeper": "ready",
+    }
     wait_for(lambda: "number" in node.command("log", "talker_1").stdout, "its words")
     assert node.command("log", "talker_1").stdout == "I am talker_1\nnumber 1\n"
     assert node.up('cmd "talker" { host = "node1"; count = 2; ready = "started"; }').returncode == 0
@@ -46,20 +51,25 @@ def test_up_starts_status_shows_log_tells_and_down_ends(make_node):
     assert node.marked() == []
 
 
-def test_what_was_killed_is_started_again_and_restart_does_so_on_purpose(make_node):
+def test_what_was_killed_is_started_again_and_restart_does_so_on_purpose(make_node) -> None:
     node = make_node(COMMANDS).start()
     assert node.up(listed("sleeper")).returncode == 0
     first = node.processes()["sleeper"]["pid"]
     os.kill(first, signal.SIGKILL)
-    wait_for(lambda: node.processes()["sleeper"]["state"] == "ready" and node.processes()["sleeper"]["starts"] == 2, "its return")
+    wait_for(
+        lambda: node.processes()["sleeper"]["state"] == "ready" and node.processes()["sleeper"]["starts"] == 2,
+        "its return",
+    )
     assert node.processes()["sleeper"]["reason"] == "was killed by SIGKILL"
     assert node.command("restart", "sleeper").returncode == 0
     assert node.processes()["sleeper"]["starts"] == 3
     assert node.command("restart", "nobody").returncode == 2
 
 
-def test_a_process_has_its_nice_value_cpus_folder_and_environment(make_node, tmp_path):
-    node = make_node(f'cmd "placed" {{ exec = "sh -c \'echo $COLOUR $PWD; exec sleep 1000\'"; folder = "{tmp_path}"; environment = "COLOUR=blue"; }}').start()
+def test_a_process_has_its_nice_value_cpus_folder_and_environment(make_node, tmp_path) -> None:
+    node = make_node(
+        f'cmd "placed" {{ exec = "sh -c \'echo $COLOUR $PWD; exec sleep 1000\'"; folder = "{tmp_path}"; environment = "COLOUR=blue"; }}'
+    ).start()
     cpu = min(os.sched_getaffinity(0))
     assert node.up(listed("placed", more=f'nice = 7; cpus = "{cpu}";')).returncode == 0
     pid = node.processes()["placed"]["pid"]
@@ -68,7 +78,7 @@ def test_a_process_has_its_nice_value_cpus_folder_and_environment(make_node, tmp
     wait_for(lambda: node.command("log", "placed").stdout == f"blue {tmp_path}\n", "its words")
 
 
-def test_a_whole_tree_ends_in_time_though_it_ignores_the_signal_and_made_sessions(make_node):
+def test_a_whole_tree_ends_in_time_though_it_ignores_the_signal_and_made_sessions(make_node) -> None:
     node = make_node(COMMANDS).start()
     assert node.up(listed("family", more="stop_time_allowed = 0.5;")).returncode == 0
     wait_for(lambda: len(node.marked()) == 3, "the family")
@@ -76,7 +86,7 @@ def test_a_whole_tree_ends_in_time_though_it_ignores_the_signal_and_made_session
     assert node.marked() == []
 
 
-def test_a_killed_deputy_leaves_no_orphan_and_takes_its_orders_up_again(make_node):
+def test_a_killed_deputy_leaves_no_orphan_and_takes_its_orders_up_again(make_node) -> None:
     node = make_node(COMMANDS).start()
     assert node.up(listed("family", "sleeper")).returncode == 0
     wait_for(lambda: len(node.marked()) == 4, "the processes")
@@ -88,7 +98,7 @@ def test_a_killed_deputy_leaves_no_orphan_and_takes_its_orders_up_again(make_nod
     assert node.marked() == []
 
 
-def test_a_failure_is_told_with_last_words(make_node):
+def test_a_failure_is_told_with_last_words(make_node) -> None:
     node = make_node(COMMANDS).start()
     up = node.up(listed("faulty", more="auto_respawn = never;"))
     assert up.returncode == 1 and "faulty on node1 is failed: ended with status 3: the disk is missing" in up.stderr
@@ -97,30 +107,47 @@ def test_a_failure_is_told_with_last_words(make_node):
     assert up.returncode == 1 and "can't be started" in up.stderr and "/no/such/program" in up.stderr
 
 
-def test_one_that_always_dies_is_tried_with_longer_waits_and_then_given_up(make_node):
+def test_one_that_always_dies_is_tried_with_longer_waits_and_then_given_up(make_node) -> None:
     node = make_node(COMMANDS).start()
-    up = node.up(listed("faulty") + 'script "s" { start cmd "faulty"; wait cmd "faulty" status "finished" timeout 30; }', "--script", "s")
+    up = node.up(
+        listed("faulty") + 'script "s" { start cmd "faulty"; wait cmd "faulty" status "finished" timeout 30; }',
+        "--script",
+        "s",
+    )
     assert up.returncode == 1 and "died 7 times in a row" in up.stderr and "list.pmd:2" in up.stderr
 
 
-def test_more_memory_than_allowed_ends_it(make_node):
+def test_more_memory_than_allowed_ends_it(make_node) -> None:
     node = make_node(COMMANDS).start()
     node.up(listed("glutton", more="memory_limit_mb = 100; auto_respawn = never;"))
     wait_for(lambda: node.processes()["glutton"]["state"] == "failed", "its end")
     assert "more than its limit of 100" in node.processes()["glutton"]["reason"]
 
 
-def test_one_waits_for_another_and_says_for_whom(make_node):
+def test_one_waits_for_another_and_says_for_whom(make_node) -> None:
     node = make_node(COMMANDS).start()
-    text = listed("oneshot") + 'cmd "sleeper" { host = "node1"; ready_timeout_s = 1; auto_respawn = never; }' + listed("talker", more='depends = "sleeper";')
-    up = node.up(text + 'script "s" { start cmd "talker"; wait cmd "talker" status "ready" timeout 1; }', "--script", "s")
+    text = (
+        listed("oneshot")
+        + 'cmd "sleeper" { host = "node1"; ready_timeout_s = 1; auto_respawn = never; }'
+        + listed("talker", more='depends = "sleeper";')
+    )
+    up = node.up(
+        text + 'script "s" { start cmd "talker"; wait cmd "talker" status "ready" timeout 1; }', "--script", "s"
+    )
     assert up.returncode == 1 and "talker on node1 is waiting: waits for list/sleeper" in up.stderr
-    up = node.up(text + 'script "s" { start cmd "sleeper"; wait cmd "sleeper" status "ready" timeout 20; }', "--script", "s")
+    up = node.up(
+        text + 'script "s" { start cmd "sleeper"; wait cmd "sleeper" status "ready" timeout 20; }', "--script", "s"
+    )
     assert up.returncode == 1 and "was not ready within 1 s" in up.stderr
-    assert node.up(text + 'script "s" { start cmd "oneshot"; wait cmd "oneshot" status "finished"; }', "--script", "s").returncode == 0
+    assert (
+        node.up(
+            text + 'script "s" { start cmd "oneshot"; wait cmd "oneshot" status "finished"; }', "--script", "s"
+        ).returncode
+        == 0
+    )
 
 
-def test_readiness_is_awaited_across_nodes(make_node):
+def test_readiness_is_awaited_across_nodes(make_node) -> None:
     one = make_node(COMMANDS).start()
     two = make_node(COMMANDS, deputy="node2", port=one.port).start()
     up = one.up(listed("sleeper", host="node2") + listed("talker", more='depends = "sleeper";'))
@@ -130,21 +157,21 @@ def test_readiness_is_awaited_across_nodes(make_node):
     assert one.marked() + two.marked() == []
 
 
-def test_only_commands_of_the_own_list_are_executed(make_node):
+def test_only_commands_of_the_own_list_are_executed(make_node) -> None:
     node = make_node(COMMANDS).start()
     up = node.up(listed("reboot"))
     assert up.returncode == 1 and "'reboot' is not in this deputy's command list, which has: sleeper, " in up.stderr
     assert node.processes() == {}
 
 
-def test_bad_settings_are_refused_before_anything_starts(make_node):
+def test_bad_settings_are_refused_before_anything_starts(make_node) -> None:
     node = make_node(COMMANDS).start()
-    up = node.up('settings { tracker.wings = 2; }' + listed("sleeper"))
+    up = node.up("settings { tracker.wings = 2; }" + listed("sleeper"))
     assert up.returncode == 2 and "wings" in up.stderr
     assert node.processes() == {}
 
 
-def test_a_host_without_a_deputy_and_a_second_deputy_with_one_id_are_told(make_node):
+def test_a_host_without_a_deputy_and_a_second_deputy_with_one_id_are_told(make_node) -> None:
     node = make_node(COMMANDS).start()
     up = node.up(listed("sleeper", host="node7"))
     assert up.returncode == 2 and "no deputy answers for node7; there is: node1" in up.stderr
@@ -154,17 +181,19 @@ def test_a_host_without_a_deputy_and_a_second_deputy_with_one_id_are_told(make_n
     assert same.returncode == 2 and "runs on this machine already" in same.stderr
 
 
-def test_without_a_deputy_commands_say_so(make_node):
+def test_without_a_deputy_commands_say_so(make_node) -> None:
     node = make_node(COMMANDS)
     for command in ("down", "status"):
         finished = node.command(command)
         assert finished.returncode == 1 and "no deputy answers" in finished.stderr
 
 
-def test_what_runs_needs_no_sheriff_and_another_one_finds_it(make_node):
+def test_what_runs_needs_no_sheriff_and_another_one_finds_it(make_node) -> None:
     node = make_node(COMMANDS).start()
     (node.folder / "list.pmd").write_text(listed("sleeper") + 'script "s" { start cmd "sleeper"; wait ms 100000; }')
-    script = subprocess.Popen(node.line("up", node.folder / "list.pmd", "--script", "s"), env=environment(), stdin=subprocess.DEVNULL)
+    script = subprocess.Popen(
+        node.line("up", node.folder / "list.pmd", "--script", "s"), env=environment(), stdin=subprocess.DEVNULL
+    )
     wait_for(node.marked, "its process")
     pids = node.marked()
     script.kill()
@@ -173,10 +202,12 @@ def test_what_runs_needs_no_sheriff_and_another_one_finds_it(make_node):
     assert node.marked() == pids == [node.processes()["sleeper"]["pid"]]
 
 
-def test_watch_prints_lines_without_a_terminal(make_node):
+def test_watch_prints_lines_without_a_terminal(make_node) -> None:
     node = make_node(COMMANDS).start()
     assert node.up(listed("sleeper")).returncode == 0
-    watch = subprocess.Popen(node.line("watch"), env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+    watch = subprocess.Popen(
+        node.line("watch"), env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True
+    )
     try:
         assert watch.stdout.readline() == "no pose yet\n"
         assert watch.stdout.readline().startswith("node1 (")
@@ -188,17 +219,21 @@ def test_watch_prints_lines_without_a_terminal(make_node):
         watch.kill()
 
 
-def test_a_busy_port_is_told(make_node):
+def test_a_busy_port_is_told(make_node) -> None:
     node = make_node(COMMANDS)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("", node.port + 3))
         for command in ("deputy", "status"):
             finished = node.command(command)
-            assert finished.returncode == 1 and f"{node.port + 3}" in finished.stderr and "hold its port" in finished.stderr
+            assert (
+                finished.returncode == 1
+                and f"{node.port + 3}" in finished.stderr
+                and "hold its port" in finished.stderr
+            )
             assert "Traceback" not in finished.stderr
 
 
-def test_who_is_not_trusted_is_not_obeyed_and_told_why(make_node, monkeypatch, tmp_path):
+def test_who_is_not_trusted_is_not_obeyed_and_told_why(make_node, monkeypatch, tmp_path) -> None:
     node = make_node(COMMANDS).start()
     monkeypatch.setenv("TESSERA_KEYS", str(tmp_path / "a stranger"))
     up = node.up(listed("sleeper"))
@@ -213,13 +248,15 @@ def hear_status(bus: lcm.LCM, asked: list[procman_status_t]) -> procman_status_t
     return asked[-1]
 
 
-def test_of_a_thousand_bad_orders_on_the_bus_none_is_obeyed_and_all_are_counted(make_node, own_keys):
+def test_of_a_thousand_bad_orders_on_the_bus_none_is_obeyed_and_all_are_counted(make_node, own_keys) -> None:
     node = make_node(COMMANDS).start()
     assert node.up(listed("sleeper")).returncode == 0
     bus, heard = lcm.LCM(f"udpm://{GROUP}:{node.port + 3}?ttl=0"), []
     bus.subscribe("PROCMAN_STATUS", lambda _channel, data: heard.append(procman_status_t.decode(data)))
     before = hear_status(bus, heard)
-    KeyRing(own_keys).trust("tests", to_text(KEY.verify_key.encode()))  # so that all kinds but strangers' get past the first question
+    KeyRing(own_keys).trust(
+        "tests", to_text(KEY.verify_key.encode())
+    )  # so that all kinds but strangers' get past the first question
     gate = Gate("node1", list)
     gate.nonce = before.nonce
     replay = (node.folder / "state" / "orders" / "list").read_bytes()
@@ -230,10 +267,12 @@ def test_of_a_thousand_bad_orders_on_the_bus_none_is_obeyed_and_all_are_counted(
             wait_for(lambda: sum(hear_status(bus, heard).num_refused) - sum(before.num_refused) > number, "the count")
     status = heard[-1]
     assert sum(status.num_refused) - sum(before.num_refused) == 1000
-    assert status.num_obeyed == before.num_obeyed and [process.pid for process in status.lists[0].processes] == [process.pid for process in before.lists[0].processes]
+    assert status.num_obeyed == before.num_obeyed and [process.pid for process in status.lists[0].processes] == [
+        process.pid for process in before.lists[0].processes
+    ]
 
 
-def test_a_revoked_key_is_obeyed_no_longer(make_node, own_keys):
+def test_a_revoked_key_is_obeyed_no_longer(make_node, own_keys) -> None:
     node = make_node(COMMANDS).start()
     bus, heard = lcm.LCM(f"udpm://{GROUP}:{node.port + 3}?ttl=0"), []
     bus.subscribe("PROCMAN_STATUS", lambda _channel, data: heard.append(procman_status_t.decode(data)))
@@ -242,7 +281,12 @@ def test_a_revoked_key_is_obeyed_no_longer(make_node, own_keys):
 
     def order() -> bytes:
         order = procman_order_t()
-        order.deputy, order.nonce, order.number, order.action = "node1", status.nonce, status.last_number + 1, procman_order_t.RUN
+        order.deputy, order.nonce, order.number, order.action = (
+            "node1",
+            status.nonce,
+            status.last_number + 1,
+            procman_order_t.RUN,
+        )
         return sign(order, key)
 
     ring.trust("base", to_text(key.verify_key.encode()))

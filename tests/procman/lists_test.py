@@ -1,15 +1,16 @@
 """Several lists on the same deputies: each is started, replaced, ended and resumed alone."""
 
-from deputies import FIRST_PORT, Node, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+from tessera_cli.messages import pose_t, stage_status_t
+from tessera_cli.settings import GROUP
 from tessera_cli.supervision.list_monitor import ListView
 from tessera_cli.supervision.process_tree import marked
-from tessera_cli.settings import GROUP
-from tessera_cli.messages import pose_t, stage_status_t
 
-COMMANDS = '''
+from deputies import FIRST_PORT, Node, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+
+COMMANDS = """
 cmd "sleeper"   { exec = "sleep 1000"; }
 cmd "talker"    { exec = "sh -c 'echo I am ${name}; exec sleep 1000'"; }
-'''
+"""
 
 
 def listed(*names: str, more: str = "") -> str:
@@ -27,7 +28,7 @@ def up_two(node: Node) -> None:
         assert up.returncode == 0, up.stderr
 
 
-def test_orders_for_one_list_leave_the_others_untouched(make_node):
+def test_orders_for_one_list_leave_the_others_untouched(make_node) -> None:
     node = make_node(COMMANDS).start()
     up_two(node)
     a, b = pids(node, "robot_a"), pids(node, "robot_b")
@@ -42,16 +43,19 @@ def test_orders_for_one_list_leave_the_others_untouched(make_node):
     assert node.marked() == []
 
 
-def test_status_tells_the_lists_apart_and_with_which_channels(make_node):
+def test_status_tells_the_lists_apart_and_with_which_channels(make_node) -> None:
     node = make_node(COMMANDS).start()
     up_two(node)
     lists = node.status()["lists"]
-    assert {name: each["channel_prefix"] for name, each in lists.items()} == {"robot_a": "ROBOT_A_", "robot_b": "ROBOT_B_"}
+    assert {name: each["channel_prefix"] for name, each in lists.items()} == {
+        "robot_a": "ROBOT_A_",
+        "robot_b": "ROBOT_B_",
+    }
     shown = node.command("status").stdout
     assert "  robot_a: on udpm://" in shown and ", channels ROBOT_B_..." in shown
 
 
-def test_a_name_that_two_lists_have_must_be_said_whole(make_node):
+def test_a_name_that_two_lists_have_must_be_said_whole(make_node) -> None:
     node = make_node(COMMANDS).start()
     up_two(node)
     vague = node.command("restart", "talker")
@@ -63,7 +67,7 @@ def test_a_name_that_two_lists_have_must_be_said_whole(make_node):
     assert (node.folder / "state" / "logs" / "robot_b" / "talker.log").is_file()
 
 
-def test_each_list_is_resumed_by_a_new_deputy_but_for_what_was_ended(make_node):
+def test_each_list_is_resumed_by_a_new_deputy_but_for_what_was_ended(make_node) -> None:
     node = make_node(COMMANDS).start()
     up_two(node)
     assert node.up(listed("sleeper"), name="pool").returncode == 0
@@ -76,7 +80,7 @@ def test_each_list_is_resumed_by_a_new_deputy_but_for_what_was_ended(make_node):
     assert [len(marked(f"{folder}/{name}/")) for name in ("pool", "robot_a", "robot_b")] == [1, 0, 2]
 
 
-def test_one_is_waited_for_in_its_own_list_only(make_node):
+def test_one_is_waited_for_in_its_own_list_only(make_node) -> None:
     node = make_node(COMMANDS).start()
     assert node.up(listed("sleeper"), name="other").returncode == 0
     text = 'cmd "sleeper" { host = "node1"; auto_respawn = never; }' + listed("talker", more='depends = "sleeper";')
@@ -84,17 +88,18 @@ def test_one_is_waited_for_in_its_own_list_only(make_node):
     assert up.returncode == 1 and "waits for list/sleeper" in up.stderr
 
 
-def test_a_bad_order_for_one_list_changes_nothing_of_any(make_node):
+def test_a_bad_order_for_one_list_changes_nothing_of_any(make_node) -> None:
     node = make_node(COMMANDS).start()
     up_two(node)
     before = node.status()["lists"]
     assert node.up(listed("sleeper", "reboot"), name="robot_b").returncode == 1
-    assert {name: set(each["processes"]) for name, each in node.status()["lists"].items()} == \
-           {name: set(each["processes"]) for name, each in before.items()}
+    assert {name: set(each["processes"]) for name, each in node.status()["lists"].items()} == {
+        name: set(each["processes"]) for name, each in before.items()
+    }
     assert len(node.marked()) == 4
 
 
-def test_nodes_that_left_a_list_end_its_processes(make_node):
+def test_nodes_that_left_a_list_end_its_processes(make_node) -> None:
     one = make_node(COMMANDS).start()
     two = make_node(COMMANDS, deputy="node2", port=one.port).start()
     assert one.up('cmd "sleeper" { host = "node1, node2"; ready = "started"; }').returncode == 0
@@ -104,15 +109,19 @@ def test_nodes_that_left_a_list_end_its_processes(make_node):
     assert len(one.marked()) == 1
 
 
-def test_stages_of_one_name_on_one_bus_are_refused(make_node):
+def test_stages_of_one_name_on_one_bus_are_refused(make_node) -> None:
     node = make_node('cmd "tracker" { exec = "sleep 1000"; }').start()
     assert node.up(listed("tracker"), name="robot_a").returncode == 0
     up = node.up('cmd "tracker" { host = "node1"; }', name="robot_b")
-    assert up.returncode == 2 and "robot_a has a 'tracker' on the same bus" in up.stderr and "bus.channel_prefix=ROBOT_B_" in up.stderr
+    assert (
+        up.returncode == 2
+        and "robot_a has a 'tracker' on the same bus" in up.stderr
+        and "bus.channel_prefix=ROBOT_B_" in up.stderr
+    )
     assert node.processes("robot_b") == {}
 
 
-def test_names_that_can_be_none_of_a_list_and_lists_that_are_not_there_are_told(make_node):
+def test_names_that_can_be_none_of_a_list_and_lists_that_are_not_there_are_told(make_node) -> None:
     node = make_node(COMMANDS).start()
     for name in ("two words", "../x"):
         up = node.up(listed("sleeper"), "--name", name)
@@ -122,7 +131,7 @@ def test_names_that_can_be_none_of_a_list_and_lists_that_are_not_there_are_told(
     assert down.returncode == 2 and "no deputy has a list 'robot_c'; there is: robot_a" in down.stderr
 
 
-def test_a_list_that_ended_is_forgotten_with_the_next_order(make_node):
+def test_a_list_that_ended_is_forgotten_with_the_next_order(make_node) -> None:
     node = make_node(COMMANDS).start()
     up_two(node)
     assert node.command("down", "robot_a").returncode == 0
@@ -131,18 +140,18 @@ def test_a_list_that_ended_is_forgotten_with_the_next_order(make_node):
     assert set(node.status()["lists"]) == {"robot_b", "pool"}
 
 
-def test_counts_of_the_command_line_replace_those_of_the_list(make_node):
+def test_counts_of_the_command_line_replace_those_of_the_list(make_node) -> None:
     node = make_node(COMMANDS).start()
     text = listed("sleeper", more="count = 0;") + listed("talker", more="count = 2;")
     assert node.up(text, "--count", "talker=1", "--count", "sleeper=1", name="counted").returncode == 0
     assert set(pids(node, "counted")) == {"talker_0", "sleeper"}
     up = node.up(text, "--count", "walker=1", name="counted")
-    assert up.returncode == 2 and "no cmd \"walker\"" in up.stderr
+    assert up.returncode == 2 and 'no cmd "walker"' in up.stderr
     up = node.up(text, "--count", "talker=many", name="counted")
     assert up.returncode == 2 and "not CMD=NUMBER" in up.stderr
 
 
-def test_who_begins_to_watch_late_knows_how_much_is_left():
+def test_who_begins_to_watch_late_knows_how_much_is_left() -> None:
     view = ListView(f"udpm://{GROUP}:{FIRST_PORT}?ttl=0", "A_")
     camera = stage_status_t()
     camera.name, camera.value_names, camera.values, camera.num_values = "camera", ["num_frames"], [120.0], 1

@@ -16,7 +16,7 @@ def ip(*words) -> None:
 class Lan:
     """Nodes 1 .. num_nodes. Multicast goes from one to the others, and no farther: the bridge has no way out."""
 
-    def __init__(self, num_nodes: int):
+    def __init__(self, num_nodes: int) -> None:
         self._bridge = f"tb{os.getpid()}"
         self._nodes = range(1, num_nodes + 1)
 

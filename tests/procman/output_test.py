@@ -1,23 +1,24 @@
 """What processes say: kept on the node within bounds, forwarded as whole lines within bounds."""
 
-from deputies import make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+from tessera_cli.messages import header_t, procman_output_t
 from tessera_cli.supervision.log_file import RotatingLog
 from tessera_cli.supervision.output_forwarder import MAX_BYTES, TAIL_BYTES, OutputForwarder
-from tessera_cli.messages import header_t, procman_output_t
+
+from deputies import make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 
 
 class RecordingBus:
-    def __init__(self):
+    def __init__(self) -> None:
         self.sent = []
 
     def header(self, _channel):
         return header_t()
 
-    def publish(self, _channel, data):
+    def publish(self, _channel, data) -> None:
         self.sent.append(procman_output_t.decode(data))
 
 
-def test_logs_are_rotated_and_the_oldest_go(tmp_path):
+def test_logs_are_rotated_and_the_oldest_go(tmp_path) -> None:
     log = RotatingLog(tmp_path / "a.log", max_bytes=100, num_old=2)
     for number in range(100):
         log.write(f"line {number:04d}\n".encode())
@@ -27,14 +28,14 @@ def test_logs_are_rotated_and_the_oldest_go(tmp_path):
     assert log.tail(12).splitlines()[0] == "line 0088", "the tail reaches into the file before"
 
 
-def test_a_log_goes_on_where_an_earlier_deputy_ended(tmp_path):
+def test_a_log_goes_on_where_an_earlier_deputy_ended(tmp_path) -> None:
     RotatingLog(tmp_path / "a.log").write(b"one\n")
     log = RotatingLog(tmp_path / "a.log")
     log.write(b"two\n\xff\n")
     assert log.tail(10) == "one\ntwo\n\N{REPLACEMENT CHARACTER}\n"
 
 
-def test_lines_are_forwarded_whole():
+def test_lines_are_forwarded_whole() -> None:
     bus = RecordingBus()
     forwarder = OutputForwarder(bus, "node1")
     forwarder.add("a", b"one\ntw")
@@ -44,7 +45,7 @@ def test_lines_are_forwarded_whole():
     assert [output.text for output in bus.sent] == ["one\n", "two\n"]
 
 
-def test_a_chatterbox_is_cut_short_and_what_is_left_out_is_counted():
+def test_a_chatterbox_is_cut_short_and_what_is_left_out_is_counted() -> None:
     bus = RecordingBus()
     forwarder = OutputForwarder(bus, "node1")
     forwarder.add("a", b"x" * 99 + b"\n" + (b"y" * 99 + b"\n") * 100)
@@ -53,7 +54,7 @@ def test_a_chatterbox_is_cut_short_and_what_is_left_out_is_counted():
     assert len(output.text) == MAX_BYTES and output.num_omitted == 101 - MAX_BYTES // 100
 
 
-def test_a_tail_comes_in_pieces_with_an_end():
+def test_a_tail_comes_in_pieces_with_an_end() -> None:
     bus = RecordingBus()
     text = "".join(f"{number}\n" for number in range(1000))
     OutputForwarder(bus, "node1").send_tail("a", "order", text)
@@ -61,7 +62,7 @@ def test_a_tail_comes_in_pieces_with_an_end():
     assert "".join(output.text for output in bus.sent) == text and bus.sent[-1].text == ""
 
 
-def test_one_that_closes_its_output_costs_the_deputy_nothing(make_node):
+def test_one_that_closes_its_output_costs_the_deputy_nothing(make_node) -> None:
     import psutil
 
     node = make_node('cmd "quiet" { exec = "sh -c \'exec sleep 1000 >&- 2>&-\'"; }').start()

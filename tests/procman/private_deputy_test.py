@@ -8,19 +8,20 @@ import time
 
 import pytest
 
-from deputies import ROOT, environment, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.supervision.attributes import RunOptions
 from tessera_cli.supervision.child_process import Child, Launch
 from tessera_cli.supervision.command_list import read_command_list
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import Process, read_process_list
-from tessera_cli.supervision.state_folder import LogFolder
-from tessera_cli.supervision.supervised_process import STATE_NAMES
 from tessera_cli.supervision.process_tree import marked
 from tessera_cli.supervision.progress import FINISHED, RUNNING, StageReport
+from tessera_cli.supervision.state_folder import LogFolder
+from tessera_cli.supervision.supervised_process import STATE_NAMES
 
-COMMANDS = '''
+from deputies import ROOT, environment, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+
+COMMANDS = """
 cmd "sleeper"  { exec = "sleep 1000"; }
 cmd "deaf"     { exec = "sh -c 'trap \\"\\" TERM; echo what; while true; do sleep 0.1; done'"; }
 cmd "oneshot"  { exec = "sh -c 'echo all is done'"; }
@@ -28,7 +29,7 @@ cmd "refuser"  { exec = "sh -c 'echo tessera-camera: there is no folder X >&2; e
 cmd "faulty"   { exec = "sh -c 'echo the disk is missing; exit 3'"; }
 cmd "busy"     { exec = "sh -c 'while true; do true; done'"; }
 cmd "absent"   { exec = "/no/such/program"; }
-'''
+"""
 STARTED = {"ready": "started", "auto_respawn": "never"}
 
 
@@ -43,7 +44,9 @@ def make_deputy(tmp_path):
 
     def make(*processes: Process) -> PrivateDeputy:
         folder = LogFolder(tmp_path / f"logs {len(made)}", "it is taken.")
-        made.append(PrivateDeputy(folder, tmp_path / "settings.yaml", processes, read_command_list(tmp_path / "commands.pmd")))
+        made.append(
+            PrivateDeputy(folder, tmp_path / "settings.yaml", processes, read_command_list(tmp_path / "commands.pmd"))
+        )
         made[-1].start()
         return made[-1]
 
@@ -57,7 +60,7 @@ def step_until(deputy: PrivateDeputy, condition, what: str) -> None:
     wait_for(lambda: (deputy.step(), condition())[1], what)
 
 
-def test_tells_who_is_at_work(make_deputy):
+def test_tells_who_is_at_work(make_deputy) -> None:
     deputy = make_deputy(process("sleeper"), process("busy"))
     step_until(deputy, lambda: deputy.is_busy(["sleeper", "busy"]), "one of them is busy")
     assert deputy.is_busy(["busy"]) and not deputy.is_busy(["sleeper"]) and not deputy.is_busy([])
@@ -68,10 +71,12 @@ def pid_of(deputy: PrivateDeputy, name: str) -> int:
 
 
 def report(deputy: PrivateDeputy, name: str, state: int) -> StageReport:
-    return StageReport(name, "host", pid_of(deputy, name), 0, state, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, "", {}, time.monotonic())
+    return StageReport(
+        name, "host", pid_of(deputy, name), 0, state, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, "", {}, time.monotonic()
+    )
 
 
-def test_what_is_killed_is_started_again_and_a_sentence_says_so(make_deputy):
+def test_what_is_killed_is_started_again_and_a_sentence_says_so(make_deputy) -> None:
     deputy = make_deputy(process("sleeper", auto_respawn="killed"))
     first = pid_of(deputy, "sleeper")
     os.kill(first, signal.SIGKILL)
@@ -80,35 +85,42 @@ def test_what_is_killed_is_started_again_and_a_sentence_says_so(make_deputy):
     assert deputy.owns(first) and deputy.owns(pid_of(deputy, "sleeper"))
 
 
-@pytest.mark.parametrize("command, error, sentence", [
-    ("refuser", UserError, "refuser: there is no folder X"),
-    ("faulty", RunFailed, "faulty ended with status 3; the last line of {logs}/faulty.log: the disk is missing"),
-    ("absent", RunFailed, "absent can't be started: "),
-])
-def test_one_that_is_beyond_help_is_told_in_a_sentence(make_deputy, tmp_path, command, error, sentence):
+@pytest.mark.parametrize(
+    "command, error, sentence",
+    [
+        ("refuser", UserError, "refuser: there is no folder X"),
+        ("faulty", RunFailed, "faulty ended with status 3; the last line of {logs}/faulty.log: the disk is missing"),
+        ("absent", RunFailed, "absent can't be started: "),
+    ],
+)
+def test_one_that_is_beyond_help_is_told_in_a_sentence(make_deputy, tmp_path, command, error, sentence) -> None:
     with pytest.raises(error) as raised:
         step_until(make_deputy(process(command)), lambda: False, "its end")
     assert str(raised.value).startswith(sentence.format(logs=tmp_path / "logs 0"))
 
 
-def test_one_that_dies_again_and_again_is_given_up(make_deputy, monkeypatch):
+def test_one_that_dies_again_and_again_is_given_up(make_deputy, monkeypatch) -> None:
     monkeypatch.setattr("tessera_cli.supervision.supervised_process.FIRST_BACK_OFF_S", 0.0)
     deputy = make_deputy(process("faulty", auto_respawn="failure"))
-    with pytest.raises(RunFailed, match="faulty died 7 times in a row, the last time it ended with status 3; .*: the disk is missing"):
+    with pytest.raises(
+        RunFailed, match="faulty died 7 times in a row, the last time it ended with status 3; .*: the disk is missing"
+    ):
         step_until(deputy, lambda: False, "its end")
     assert len(deputy.warnings) == 6
 
 
-def test_one_that_ends_well_has_ended(make_deputy):
+def test_one_that_ends_well_has_ended(make_deputy) -> None:
     deputy = make_deputy(process("oneshot"))
     step_until(deputy, lambda: deputy.is_over, "its end")
     deputy.require_success("oneshot")
     assert deputy.ended == ["oneshot"] and deputy.last_words("oneshot") == "all is done"
 
 
-def test_a_status_makes_ready_and_silence_is_a_hang(make_deputy):
-    deputy = make_deputy(process("sleeper", "stage", ready="status", hang_timeout_s=0.3, auto_respawn="killed"),
-                         process("sleeper", "last", depends=("stage",)))
+def test_a_status_makes_ready_and_silence_is_a_hang(make_deputy) -> None:
+    deputy = make_deputy(
+        process("sleeper", "stage", ready="status", hang_timeout_s=0.3, auto_respawn="killed"),
+        process("sleeper", "last", depends=("stage",)),
+    )
     assert deputy.not_ready == ["stage", "last"]
     deputy.hear([report(deputy, "stage", RUNNING)])
     step_until(deputy, lambda: not deputy.not_ready, "the one that depends on it")
@@ -116,7 +128,7 @@ def test_a_status_makes_ready_and_silence_is_a_hang(make_deputy):
     assert deputy.warnings == ["stage said nothing for 0.3 s and was started again."]
 
 
-def test_who_was_stopped_itself_takes_nobody_for_hung(make_deputy):
+def test_who_was_stopped_itself_takes_nobody_for_hung(make_deputy) -> None:
     deputy = make_deputy(process("sleeper", ready="status", hang_timeout_s=0.5))
     deputy.hear([report(deputy, "sleeper", RUNNING)])
     time.sleep(1.2)  # as after Ctrl-Z and fg
@@ -126,8 +138,12 @@ def test_who_was_stopped_itself_takes_nobody_for_hung(make_deputy):
         step_until(deputy, lambda: False, "the hang")
 
 
-def test_the_end_comes_in_order_but_for_what_has_done_its_work(make_deputy):
-    deputy = make_deputy(process("sleeper", "recorder"), process("sleeper", "camera", ("recorder",), ready="status"), process("sleeper", "tracker"))
+def test_the_end_comes_in_order_but_for_what_has_done_its_work(make_deputy) -> None:
+    deputy = make_deputy(
+        process("sleeper", "recorder"),
+        process("sleeper", "camera", ("recorder",), ready="status"),
+        process("sleeper", "tracker"),
+    )
     step_until(deputy, lambda: deputy.not_ready == ["camera"], "the others")
     deputy.step()
     deputy.hear([report(deputy, "camera", FINISHED)])
@@ -138,15 +154,17 @@ def test_the_end_comes_in_order_but_for_what_has_done_its_work(make_deputy):
     assert deputy.is_over and deputy.warnings == []
 
 
-def test_what_depends_on_it_and_still_works_ends_first(make_deputy):
-    deputy = make_deputy(process("sleeper", "recorder"), process("sleeper", "camera", ("recorder",)), process("sleeper", "tracker"))
+def test_what_depends_on_it_and_still_works_ends_first(make_deputy) -> None:
+    deputy = make_deputy(
+        process("sleeper", "recorder"), process("sleeper", "camera", ("recorder",)), process("sleeper", "tracker")
+    )
     step_until(deputy, lambda: not deputy.not_ready, "all")
     deputy.end(["recorder"])
     states = {member.name: STATE_NAMES[member.state] for member in deputy.processes}
     assert states == {"recorder": "stopped", "camera": "stopped", "tracker": "ready"}
 
 
-def test_what_does_not_listen_is_killed_and_that_is_told_once(make_deputy):
+def test_what_does_not_listen_is_killed_and_that_is_told_once(make_deputy) -> None:
     deputy = make_deputy(process("deaf", stop_time_allowed=0.2))
     step_until(deputy, lambda: deputy.last_words("deaf") == "what", "its deafness")
     deputy.end(["deaf"])
@@ -154,7 +172,7 @@ def test_what_does_not_listen_is_killed_and_that_is_told_once(make_deputy):
     assert deputy.warnings == ["deaf did not end within 0.2 s and was killed."]
 
 
-def test_processor_time_and_memory_add_up_over_lives(make_deputy):
+def test_processor_time_and_memory_add_up_over_lives(make_deputy) -> None:
     deputy = make_deputy(process("deaf", auto_respawn="always"))
     (member,) = deputy.processes
     for life in (1, 2):
@@ -166,7 +184,7 @@ def test_processor_time_and_memory_add_up_over_lives(make_deputy):
     assert 0 < member.max_rss_mb < 50
 
 
-def test_peak_memory_is_the_process_own_and_not_what_the_deputy_had(tmp_path):
+def test_peak_memory_is_the_process_own_and_not_what_the_deputy_had(tmp_path) -> None:
     ballast = bytearray(b"x" * 100_000_000)
     child = Child(Launch(("sleep", "0.3"), tmp_path, (), "sleeper", (), RunOptions(), "", 0), f"{tmp_path}/sleeper")
     wait_for(lambda: child.poll() is not None, "its end")
@@ -175,13 +193,13 @@ def test_peak_memory_is_the_process_own_and_not_what_the_deputy_had(tmp_path):
     assert 0 < child.max_rss_mb < 50
 
 
-def test_a_folder_belongs_to_one_deputy_at_a_time(tmp_path):
+def test_a_folder_belongs_to_one_deputy_at_a_time(tmp_path) -> None:
     first = LogFolder(tmp_path / "logs", "it is taken.")
     with pytest.raises(UserError, match="it is taken"):
         LogFolder(first.path, "it is taken.")
 
 
-KILLED = '''
+KILLED = """
 import os, signal, sys
 from pathlib import Path
 from tessera_cli.supervision.private_deputy import PrivateDeputy
@@ -194,13 +212,15 @@ deputy = PrivateDeputy(LogFolder(folder / "logs", ""), folder, read_process_list
 deputy.start()
 print("started", flush=True)
 signal.pause()
-'''
+"""
 
 
-def test_not_even_a_grandchild_in_a_session_of_its_own_outlives_a_killed_deputy(tmp_path):
+def test_not_even_a_grandchild_in_a_session_of_its_own_outlives_a_killed_deputy(tmp_path) -> None:
     (tmp_path / "commands.pmd").write_text('cmd "family" { exec = "sh -c \'setsid sleep 1001 & sleep 1002; wait\'"; }')
     (tmp_path / "list.pmd").write_text('cmd "family" { ready = "started"; }')
-    deputy = subprocess.Popen([sys.executable, "-c", KILLED, tmp_path], env=environment(), stdout=subprocess.PIPE, text=True)
+    deputy = subprocess.Popen(
+        [sys.executable, "-c", KILLED, tmp_path], env=environment(), stdout=subprocess.PIPE, text=True
+    )
     assert deputy.stdout.readline() == "started\n"
     wait_for(lambda: len(marked(f"{tmp_path}/")) == 3, "the family")
     deputy.kill()
@@ -208,7 +228,7 @@ def test_not_even_a_grandchild_in_a_session_of_its_own_outlives_a_killed_deputy(
     wait_for(lambda: not marked(f"{tmp_path}/"), "the end of the orphans")
 
 
-def test_a_run_has_as_many_processes_as_it_says():
+def test_a_run_has_as_many_processes_as_it_says() -> None:
     path = ROOT / "procman" / "local.pmd"
     run = read_process_list(path, {"extractor": 3, "recorder": 1, "camera": 1}).processes
     assert [name for name in run if "extractor" in name] == ["extractor_0", "extractor_1", "extractor_2"]

@@ -9,14 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from deputies import FIRST_PORT, ROOT, Node, environment, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
-from namespaces import lan  # noqa: F401
 from tessera_cli.files import BIN
 
-sys.path.insert(0, str(ROOT / "tests" / "pipeline"))
-from synthetic_sequence import write_sequence  # noqa: E402
+from deputies import FIRST_PORT, ROOT, Node, environment, make_node, own_keys, wait_for  # noqa: F401, sets the path to tessera_cli too
+from namespaces import lan  # noqa: F401
 
-pytestmark = pytest.mark.skipif(not (BIN / "tessera-tracker").exists(), reason="the stages are not built: procman/tessera setup builds them")
+sys.path.insert(0, str(ROOT / "tests" / "pipeline"))
+from synthetic_sequence import write_sequence
+
+pytestmark = pytest.mark.skipif(
+    not (BIN / "tessera-tracker").exists(), reason="the stages are not built: procman/tessera setup builds them"
+)
 NUM_FRAMES = 60
 REFERENCE_PORT = FIRST_PORT - 50
 STAGES = ("camera", "dispatcher", "reassembler", "tracker", "mapper", "loop_closer", "global_adjuster", "evaluator")
@@ -32,13 +35,40 @@ def sequence(tmp_path_factory) -> Path:
 def reference(sequence, tmp_path_factory) -> dict:
     """What one machine makes of it."""
     folder = tmp_path_factory.mktemp("reference")
-    subprocess.run([sys.executable, "-m", "tessera_cli", "run", f"kitti:{sequence}", "--extractors", "1", "--port", str(REFERENCE_PORT),
-                    "--out", folder], env=environment(), check=True, capture_output=True, timeout=120)
+    subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "tessera_cli",
+            "run",
+            f"kitti:{sequence}",
+            "--extractors",
+            "1",
+            "--port",
+            str(REFERENCE_PORT),
+            "--out",
+            folder,
+        ],
+        env=environment(),
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
     return json.loads((folder / "summary.json").read_text())
 
 
 def run_script(node: Node, name: str, sequence: Path, out: Path, *options) -> list:
-    return ["up", ROOT / "procman" / name, "--script", "run", "--set", f"camera.source=kitti:{sequence}", "--out", out, *options]
+    return [
+        "up",
+        ROOT / "procman" / name,
+        "--script",
+        "run",
+        "--set",
+        f"camera.source=kitti:{sequence}",
+        "--out",
+        out,
+        *options,
+    ]
 
 
 def must_equal(folder: Path, reference: dict) -> None:
@@ -46,7 +76,7 @@ def must_equal(folder: Path, reference: dict) -> None:
     assert {key: facts[key] for key in HASHES} == {key: reference[key] for key in HASHES}
 
 
-def test_a_script_runs_the_whole_stack_on_one_machine(make_node, sequence, reference, tmp_path):
+def test_a_script_runs_the_whole_stack_on_one_machine(make_node, sequence, reference, tmp_path) -> None:
     node = make_node(deputy=os.uname().nodename).start()
     finished = node.command(*run_script(node, "local.pmd", sequence, tmp_path / "out"))
     assert finished.returncode == 0 and "script run ended well" in finished.stdout, finished.stderr
@@ -57,14 +87,25 @@ def test_a_script_runs_the_whole_stack_on_one_machine(make_node, sequence, refer
     assert set(summary["cpu_s"]) == set(summary["max_rss_mb"]) == {*STAGES, "extractor_0", "extractor_1"}
     assert summary["wall_s"] > 0 and summary["cpu_s"]["tracker"] > 0 and summary["max_rss_mb"]["tracker"] > 1
     assert summary["warnings"] == [] and summary["extractor_restarts"] == 0
-    assert (tmp_path / "out" / "report.html").is_file() and f"report: {tmp_path / 'out' / 'report.html'}" in finished.stdout
+    assert (
+        tmp_path / "out" / "report.html"
+    ).is_file() and f"report: {tmp_path / 'out' / 'report.html'}" in finished.stdout
 
 
-def test_two_robots_have_a_stack_each_on_one_deputy(make_node, sequence, reference, tmp_path):
+def test_two_robots_have_a_stack_each_on_one_deputy(make_node, sequence, reference, tmp_path) -> None:
     node = make_node(deputy=os.uname().nodename).start()
-    lines = {name: node.line(*run_script(node, "local.pmd", sequence, tmp_path / name, "--name", name, "--set", f"bus.channel_prefix={name}_"))
-             for name in ("A", "B")}
-    scripts = [subprocess.Popen(line, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for line in lines.values()]
+    lines = {
+        name: node.line(
+            *run_script(
+                node, "local.pmd", sequence, tmp_path / name, "--name", name, "--set", f"bus.channel_prefix={name}_"
+            )
+        )
+        for name in ("A", "B")
+    }
+    scripts = [
+        subprocess.Popen(line, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        for line in lines.values()
+    ]
     try:
         for script in scripts:
             assert script.wait(120) == 0, script.stdout.read()
@@ -76,25 +117,37 @@ def test_two_robots_have_a_stack_each_on_one_deputy(make_node, sequence, referen
     assert node.marked() == []
 
 
-def test_a_stage_that_says_nothing_hangs_and_is_started_again(make_node):
+def test_a_stage_that_says_nothing_hangs_and_is_started_again(make_node) -> None:
     node = make_node().start()
     assert node.up('cmd "extractor" { host = "node1"; hang_timeout_s = 2; }').returncode == 0
     os.kill(node.processes()["extractor"]["pid"], signal.SIGSTOP)
-    wait_for(lambda: node.processes()["extractor"]["starts"] == 2 and node.processes()["extractor"]["state"] == "ready", "its return")
+    wait_for(
+        lambda: node.processes()["extractor"]["starts"] == 2 and node.processes()["extractor"]["state"] == "ready",
+        "its return",
+    )
     assert node.processes()["extractor"]["reason"] == "said nothing for 2 s"
 
 
-def test_a_stage_that_cannot_become_ready_is_told_with_its_reason(make_node):
+def test_a_stage_that_cannot_become_ready_is_told_with_its_reason(make_node) -> None:
     node = make_node().start()
-    up = node.up('cmd "camera" { host = "node1"; auto_respawn = never; }', "--set", "camera.source=kitti:/no/such/folder")
-    assert up.returncode == 1 and "camera on node1 is failed: ended with status 2: tessera-camera: " in up.stderr and "/no/such/folder" in up.stderr
+    up = node.up(
+        'cmd "camera" { host = "node1"; auto_respawn = never; }', "--set", "camera.source=kitti:/no/such/folder"
+    )
+    assert (
+        up.returncode == 1
+        and "camera on node1 is failed: ended with status 2: tessera-camera: " in up.stderr
+        and "/no/such/folder" in up.stderr
+    )
 
 
 def make_nodes(make_node, lan) -> list[Node]:
-    return [make_node(deputy=f"node{i}", prefix=tuple(lan.at(i)), is_lan=True, port=FIRST_PORT - 100).start() for i in range(1, 5)]
+    return [
+        make_node(deputy=f"node{i}", prefix=tuple(lan.at(i)), is_lan=True, port=FIRST_PORT - 100).start()
+        for i in range(1, 5)
+    ]
 
 
-def test_four_nodes_make_what_one_makes(make_node, lan, sequence, reference, tmp_path):
+def test_four_nodes_make_what_one_makes(make_node, lan, sequence, reference, tmp_path) -> None:
     nodes = make_nodes(make_node, lan)
     finished = nodes[0].command(*run_script(nodes[0], "lan.pmd", sequence, tmp_path / "out"))
     assert finished.returncode == 0, finished.stderr
@@ -102,10 +155,12 @@ def test_four_nodes_make_what_one_makes(make_node, lan, sequence, reference, tmp
     assert [node.marked() for node in nodes] == [[], [], [], []]
 
 
-def test_it_comes_back_when_deputies_die_and_a_cable_is_pulled(make_node, lan, sequence, reference, tmp_path):
+def test_it_comes_back_when_deputies_die_and_a_cable_is_pulled(make_node, lan, sequence, reference, tmp_path) -> None:
     nodes = make_nodes(make_node, lan)
     line = run_script(nodes[0], "lan.pmd", sequence, tmp_path / "out", "--set", "camera.pace=0.5")
-    script = subprocess.Popen(nodes[0].line(*line), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    script = subprocess.Popen(
+        nodes[0].line(*line), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     try:
         wait_for(lambda: len(nodes[0].marked()) == 8, "the camera")
         nodes[2].kill()
@@ -120,11 +175,13 @@ def test_it_comes_back_when_deputies_die_and_a_cable_is_pulled(make_node, lan, s
     must_equal(tmp_path / "out", reference)
 
 
-def test_the_node_of_the_camera_dies_and_the_run_begins_anew(make_node, lan, sequence, reference, tmp_path):
+def test_the_node_of_the_camera_dies_and_the_run_begins_anew(make_node, lan, sequence, reference, tmp_path) -> None:
     """Nobody else has what its tracker knew; the extractors on the other nodes go on."""
     nodes = make_nodes(make_node, lan)
     line = run_script(nodes[1], "lan.pmd", sequence, tmp_path / "out", "--set", "camera.pace=0.5")
-    script = subprocess.Popen(nodes[1].line(*line), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    script = subprocess.Popen(
+        nodes[1].line(*line), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     try:
         wait_for(lambda: len(nodes[0].marked()) == len(STAGES), "the camera")
         extractors = nodes[1].marked()

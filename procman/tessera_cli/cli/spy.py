@@ -14,7 +14,9 @@ PORT_OFFSETS = {"main": 0, "camera": 1, "work": 2, "procman": 3}
 def main(arguments: Namespace) -> int:
     jar = BUILD / "tessera_types.jar"
     if not jar.is_file():
-        raise RunFailed(f"{jar} is missing: the build makes it where a JDK is installed; procman/tessera setup installs one.")
+        raise RunFailed(
+            f"{jar} is missing: the build makes it where a JDK is installed; procman/tessera setup installs one."
+        )
     if not os.environ.get("DISPLAY"):
         raise RunFailed("lcm-spy is a window and needs a display, but DISPLAY is not set.")
     url = bus_url(arguments.port + PORT_OFFSETS[arguments.bus])

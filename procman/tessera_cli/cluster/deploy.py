@@ -11,16 +11,28 @@ import sys
 from argparse import Namespace
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
+from tessera_cli.cluster.keys import KeyRing, key_folder, to_text
+from tessera_cli.cluster.node_facts import (
+    Fault,
+    Here,
+    NodeFacts,
+    obstacles,
+    own_key_name,
+    parse_facts,
+    probe,
+    read_packages,
+    remarks,
+    shortcomings,
+)
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BUILD, ROOT
 from tessera_cli.supervision.sheriff_commands import say
-from tessera_cli.cluster.keys import KeyRing, key_folder, to_text
-from tessera_cli.cluster.node_facts import (Fault, Here, NodeFacts, obstacles, own_key_name, parse_facts, probe, read_packages, remarks,
-                                        shortcomings)
 
-NODE = re.compile(r"(?P<login>(?:[A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9][A-Za-z0-9_.-]*)(?::(?P<folder>[A-Za-z0-9_./][A-Za-z0-9_./+-]*))?")
+NODE = re.compile(
+    r"(?P<login>(?:[A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9][A-Za-z0-9_.-]*)(?::(?P<folder>[A-Za-z0-9_./][A-Za-z0-9_./+-]*))?"
+)
 DEFAULT_FOLDER = "tessera"  # in the home folder
 PREBUILT = "build/.prebuilt"  # tells `tessera setup` there that nothing is to be built
 BUILT = ("build/bin/*", "build/lcmtypes/python/tessera/*.py", "build/versions.json", "build/tessera_types.jar")
@@ -29,8 +41,8 @@ SSH_FAILED = 255
 
 @dataclass(frozen=True)
 class Node:
-    text: str    # as it was typed
-    login: str   # [USER@]HOST
+    text: str  # as it was typed
+    login: str  # [USER@]HOST
     folder: str  # absolute or from the home folder
 
 
@@ -78,7 +90,7 @@ def look_here() -> Here:
 class Deployment:
     """Of one node."""
 
-    def __init__(self, node: Node, shell: list[str], files: list[str], here: Here, arguments: Namespace):
+    def __init__(self, node: Node, shell: list[str], files: list[str], here: Here, arguments: Namespace) -> None:
         self._node, self._files, self._here = node, files, here
         self._is_built, self._sets_up, self._is_dry = arguments.built, arguments.setup, arguments.dry_run
         self._ssh_words = [*shell, "-o", "ConnectTimeout=10"]
@@ -105,8 +117,10 @@ class Deployment:
     def _probe(self) -> NodeFacts:
         finished = probe(self._ssh, self._node.folder, self._here.packages)
         if finished.returncode != 0:
-            raise RunFailed(f"{'can not be reached' if finished.returncode == SSH_FAILED else 'can not be looked at'}: "
-                            f"{_last_line(finished.stderr) or f'status {finished.returncode}'}")
+            raise RunFailed(
+                f"{'can not be reached' if finished.returncode == SSH_FAILED else 'can not be looked at'}: "
+                f"{_last_line(finished.stderr) or f'status {finished.returncode}'}"
+            )
         return parse_facts(finished.stdout)
 
     def _copy(self, facts: NodeFacts) -> None:
@@ -115,9 +129,21 @@ class Deployment:
         if not self._is_dry:
             self._remote(f"mkdir -p {shlex.quote(self._node.folder)}")
             self._remove(gone)
-        command = ["rsync", "--recursive", "--links", "--perms", "--checksum", "--itemize-changes", "--files-from=-", "--from0",
-                   "-e", shlex.join(self._ssh_words), *(["--dry-run"] if self._is_dry else []),
-                   f"{ROOT}/", f"{self._node.login}:{self._node.folder}/"]
+        command = [
+            "rsync",
+            "--recursive",
+            "--links",
+            "--perms",
+            "--checksum",
+            "--itemize-changes",
+            "--files-from=-",
+            "--from0",
+            "-e",
+            shlex.join(self._ssh_words),
+            *(["--dry-run"] if self._is_dry else []),
+            f"{ROOT}/",
+            f"{self._node.login}:{self._node.folder}/",
+        ]
         finished = subprocess.run(command, input="\0".join(self._files), capture_output=True, text=True)
         if finished.returncode != 0 and not (self._is_dry and not facts.home):
             raise RunFailed(f"the copy failed: {_last_line(finished.stderr)}")
@@ -126,8 +152,10 @@ class Deployment:
             num_changed = len(self._files)
         if not self._is_dry:
             self._leave_list()
-        say(f"{self._node.text}: {num_changed} of {len(self._files)} files {'would be ' if self._is_dry else ''}copied to {self._node.folder}/, "
-            f"{len(gone)} {'would be ' if self._is_dry else ''}removed")
+        say(
+            f"{self._node.text}: {num_changed} of {len(self._files)} files {'would be ' if self._is_dry else ''}copied to {self._node.folder}/, "
+            f"{len(gone)} {'would be ' if self._is_dry else ''}removed"
+        )
 
     def _remove(self, gone: list[str]) -> None:
         if gone:
@@ -136,8 +164,11 @@ class Deployment:
     def _leave_list(self) -> None:
         """What was brought, so that the next deploy takes away what is no more."""
         files = self._files + ([PREBUILT] if self._is_built else [])
-        self._remote(f"cd {shlex.quote(self._node.folder)} && cat > .tessera-deployed" + (f" && touch {PREBUILT}" if self._is_built else ""),
-                     "".join(f"{name}\n" for name in files))
+        self._remote(
+            f"cd {shlex.quote(self._node.folder)} && cat > .tessera-deployed"
+            + (f" && touch {PREBUILT}" if self._is_built else ""),
+            "".join(f"{name}\n" for name in files),
+        )
 
     def _remote(self, command: str, text: str = "") -> None:
         finished = subprocess.run([*self._ssh, command], input=text, capture_output=True, text=True)
@@ -149,7 +180,14 @@ class Deployment:
         say(f"{self._node.text}: procman/tessera setup there")
         sys.stdout.flush()
         terminal = ["-t"] if sys.stdin.isatty() else []
-        finished = subprocess.run([*self._ssh_words, *terminal, self._node.login, f"cd {shlex.quote(self._node.folder)} && procman/tessera setup"])
+        finished = subprocess.run(
+            [
+                *self._ssh_words,
+                *terminal,
+                self._node.login,
+                f"cd {shlex.quote(self._node.folder)} && procman/tessera setup",
+            ]
+        )
         if finished.returncode != 0:
             raise RunFailed(f"setup ended there with status {finished.returncode}; its words are above.")
 

@@ -68,7 +68,7 @@ def from_text(text: str) -> bytes:
 
 
 class KeyRing:
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path) -> None:
         self.secret_path = folder / "sheriff.key"
         self.trusted_path = folder / "trusted_keys"
 

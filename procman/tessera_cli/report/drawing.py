@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tessera_cli.runs.run_folder import Result
 from tessera_cli.report.svg import BAD, NUM_SERIES, SERIES
+from tessera_cli.runs.run_folder import Result
 
 # Units in which texts are 11 and 12 high: a card is about as wide as a phone.
 CARD = (380, 285)
@@ -29,7 +29,7 @@ class Drawing:
 
 
 def short(name: str) -> str:
-    return name if len(name) <= MAX_NAME else f"{name[:MAX_NAME // 2]}…{name[-(MAX_NAME // 2 - 1):]}"
+    return name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-(MAX_NAME // 2 - 1) :]}"
 
 
 def color_of(index: int) -> str:
@@ -77,6 +77,7 @@ def numbered_where(results: list[Result], has: Callable[[Result], bool]) -> list
 
 def in_order(processes: list[str]) -> list[str]:
     """As the data flow; those beside the pipeline at the end."""
+
     def place(name: str) -> tuple[int, str]:
         places = [index for index, stage in enumerate(PIPELINE) if name.startswith(stage)]
         return (places[0] if places else len(PIPELINE), name)

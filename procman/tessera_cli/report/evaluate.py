@@ -41,8 +41,10 @@ def _read(path: Path, truth: Path | None, arguments: Namespace) -> Result:
 def _name_apart(results: list[Result], paths: list[Path]) -> list[Result]:
     """Those of one name get their folders' names too."""
     names = [result.name for result in results]
-    return [replace(result, name=f"{path.absolute().parent.name}/{result.name}") if names.count(result.name) > 1 else result
-            for result, path in zip(results, paths)]
+    return [
+        replace(result, name=f"{path.absolute().parent.name}/{result.name}") if names.count(result.name) > 1 else result
+        for result, path in zip(results, paths)
+    ]
 
 
 def _print_one(result: Result) -> None:
@@ -54,13 +56,17 @@ def _print_one(result: Result) -> None:
     print(f"poses      {len(errors)} of {error.num_estimated} have a ground truth")
     print(f"alignment  {error.alignment}, scale {error.scale:.6f}")
     print(f"RMS error  {error.rms_m:.4f} m")
-    print(f"           mean {errors.mean():.4f} m, median {np.median(errors):.4f} m, 95 % {np.percentile(errors, 95):.4f} m, "
-          f"max {errors.max():.4f} m")
+    print(
+        f"           mean {errors.mean():.4f} m, median {np.median(errors):.4f} m, 95 % {np.percentile(errors, 95):.4f} m, "
+        f"max {errors.max():.4f} m"
+    )
 
 
 def _print_table(results: list[Result]) -> None:
     width = max(len(result.name) for result in results)
-    print(f"{'':{width}}  {'poses':>6}  {'RMS m':>9}  {'mean m':>9}  {'median m':>9}  {'95 % m':>9}  {'max m':>9}  alignment")
+    print(
+        f"{'':{width}}  {'poses':>6}  {'RMS m':>9}  {'mean m':>9}  {'median m':>9}  {'95 % m':>9}  {'max m':>9}  alignment"
+    )
     for result in results:
         error = result.error
         if error is None:
@@ -68,8 +74,11 @@ def _print_table(results: list[Result]) -> None:
             continue
         errors = error.errors_m
         figures = (error.rms_m, errors.mean(), np.median(errors), np.percentile(errors, 95), errors.max())
-        print(f"{result.name:{width}}  {len(errors):6}  " + "  ".join(f"{figure:9.4f}" for figure in figures)
-              + f"  {error.alignment}, scale {error.scale:.6g}")
+        print(
+            f"{result.name:{width}}  {len(errors):6}  "
+            + "  ".join(f"{figure:9.4f}" for figure in figures)
+            + f"  {error.alignment}, scale {error.scale:.6g}"
+        )
 
 
 def _write_report(results: list[Result], path: Path) -> None:

@@ -58,8 +58,13 @@ def measure_extraction() -> int:
 def _run_benchmark() -> list[dict]:
     if not BENCHMARK.is_file():
         raise RunFailed(f"{BENCHMARK} is missing; procman/tessera setup builds it.")
-    command = [BENCHMARK, "--benchmark_format=json", f"--benchmark_repetitions={REPETITIONS}",
-               "--benchmark_enable_random_interleaving=true", "--benchmark_min_time=0.3"]
+    command = [
+        BENCHMARK,
+        "--benchmark_format=json",
+        f"--benchmark_repetitions={REPETITIONS}",
+        "--benchmark_enable_random_interleaving=true",
+        "--benchmark_min_time=0.3",
+    ]
     finished = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     if finished.returncode != 0:
         raise RunFailed(f"{BENCHMARK.name} failed: {finished.stderr.strip().splitlines()[-1:]}")
@@ -71,9 +76,16 @@ def _to_rows(results: list[dict]) -> list[Row]:
     if REFERENCE not in medians or WHOLE not in medians:
         raise RunFailed(f"{BENCHMARK.name} measured neither {REFERENCE} nor {WHOLE}.")
     reference_ms, whole_ms = medians[REFERENCE]["cpu_time"], medians[WHOLE]["cpu_time"]
-    return [Row(name, result["cpu_time"], result["cpu_time"] / reference_ms, result["cpu_time"] / whole_ms,
-                {counter: result[counter] for counter in COUNTERS if counter in result})
-            for name, result in sorted(medians.items())]  # they come in random order
+    return [
+        Row(
+            name,
+            result["cpu_time"],
+            result["cpu_time"] / reference_ms,
+            result["cpu_time"] / whole_ms,
+            {counter: result[counter] for counter in COUNTERS if counter in result},
+        )
+        for name, result in sorted(medians.items())
+    ]  # they come in random order
 
 
 def _print_table(rows: list[Row]) -> None:
@@ -99,7 +111,9 @@ def _write_csv(rows: list[Row], path: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(["what", "cpu_ms", "times_cv_orb", "times_whole", *COUNTERS])
         for row in rows:
-            writer.writerow([row.name, row.cpu_ms, row.of_reference, row.of_whole, *(row.counters.get(c, "") for c in COUNTERS)])
+            writer.writerow(
+                [row.name, row.cpu_ms, row.of_reference, row.of_whole, *(row.counters.get(c, "") for c in COUNTERS)]
+            )
     os.replace(unfinished(path), path)
 
 

@@ -54,8 +54,12 @@ def measure(source: Source, folder: Path) -> Measured:
     if finished.returncode != 0:
         raise UserError(f"{finished.stderr.strip()}.")
     summary = finished.stdout.strip().removeprefix(f"{VOCABULARY}: ")
-    return Measured(source.name, summary, read_columns(folder / f"{VOCABULARY.stem}_answers.csv"),
-                    read_columns(folder / f"{VOCABULARY.stem}_curve.csv"))
+    return Measured(
+        source.name,
+        summary,
+        read_columns(folder / f"{VOCABULARY.stem}_answers.csv"),
+        read_columns(folder / f"{VOCABULARY.stem}_curve.csv"),
+    )
 
 
 def read_columns(path: Path) -> dict[str, np.ndarray]:
@@ -75,7 +79,14 @@ def plot(measured: list[Measured], path: Path) -> None:
         curve_axes.set(title=each.name, xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.02))
         is_true = each.answers["is_true"] > 0
         for mask, color, label in ((~is_true, "tab:red", "another place"), (is_true, "tab:green", "the same place")):
-            score_axes.plot(each.answers["frame"][mask], each.answers["normalised"][mask], ".", color=color, markersize=3, label=label)
+            score_axes.plot(
+                each.answers["frame"][mask],
+                each.answers["normalised"][mask],
+                ".",
+                color=color,
+                markersize=3,
+                label=label,
+            )
         score_axes.set(xlabel="frame", ylabel="best older place's score / neighbour's", ylim=(0, None))
         score_axes.legend()
         for axes in (curve_axes, score_axes):

@@ -16,8 +16,15 @@ RECORDED = ROOT.parent / "shared" / "data"
 REAL = ("kitti:{}/kitti/sequences/03", "kitti:{}/torcs/g-track-3")
 MADE = ("sim:street", "sim:street,seed=7", "sim:street-short")
 NUM_FRAMES = 801
-HEADINGS = {"corners_per_image": "keypoints sent an image", "matches_per_frame": "matches a frame", "observations_per_landmark": "track length (keyframes)",
-            "drift_percent": "drift (% of the way)", "length_m": "way (m)", "frames": "frames", "lost": "lost"}
+HEADINGS = {
+    "corners_per_image": "keypoints sent an image",
+    "matches_per_frame": "matches a frame",
+    "observations_per_landmark": "track length (keyframes)",
+    "drift_percent": "drift (% of the way)",
+    "length_m": "way (m)",
+    "frames": "frames",
+    "lost": "lost",
+}
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,9 @@ def measure_worlds(sources: list[str]) -> int:
 
 
 def default_sources() -> list[str]:
-    return [text.format(RECORDED) for text in REAL if Path(text.format(RECORDED).removeprefix("kitti:")).is_dir()] + list(MADE)
+    return [
+        text.format(RECORDED) for text in REAL if Path(text.format(RECORDED).removeprefix("kitti:")).is_dir()
+    ] + list(MADE)
 
 
 def measure(source: str, folder: Path) -> Row:
@@ -65,6 +74,8 @@ def measure(source: str, folder: Path) -> Row:
 def as_markdown(rows: list[Row]) -> str:
     lines = ["| source | " + " | ".join(HEADINGS.values()) + " |", "|---" * (len(HEADINGS) + 1) + "|"]
     for row in rows:
-        figures = " | ".join(f"{getattr(row, name):.3g}" if name == "drift_percent" else f"{getattr(row, name):.5g}" for name in HEADINGS)
+        figures = " | ".join(
+            f"{getattr(row, name):.3g}" if name == "drift_percent" else f"{getattr(row, name):.5g}" for name in HEADINGS
+        )
         lines.append(f"| {row.source} | {figures} |")
     return "\n".join(lines) + "\n"

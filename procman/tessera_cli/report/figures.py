@@ -3,11 +3,21 @@ left out where no result has what it shows."""
 
 import numpy as np
 
-from tessera_cli.report.drawing import CARD, Drawing, add_legend, color_of, dashes_of, numbered_where, short, start_s, thin
-from tessera_cli.runs.run_folder import Result
+from tessera_cli.report.drawing import (
+    CARD,
+    Drawing,
+    add_legend,
+    color_of,
+    dashes_of,
+    numbered_where,
+    short,
+    start_s,
+    thin,
+)
+from tessera_cli.report.path_figures import draw_errors, draw_ways
 from tessera_cli.report.svg import BAD, drawing_style, new_figure, to_svg
 from tessera_cli.report.time_figures import draw_cpu, draw_frame_rate, draw_pose_times, draw_steps
-from tessera_cli.report.path_figures import draw_errors, draw_ways
+from tessera_cli.runs.run_folder import Result
 
 
 def draw_all(results: list[Result]) -> list[Drawing]:
@@ -18,7 +28,9 @@ def draw_all(results: list[Result]) -> list[Drawing]:
 
 
 def draw_map_growth(results: list[Result]) -> Drawing | None:
-    numbered = numbered_where(results, lambda result: result.frames is not None and np.isfinite(result.frames.landmarks).any())
+    numbered = numbered_where(
+        results, lambda result: result.frames is not None and np.isfinite(result.frames.landmarks).any()
+    )
     if not numbered:
         return None
     figure = new_figure(*CARD)
@@ -36,13 +48,18 @@ def draw_map_growth(results: list[Result]) -> Drawing | None:
     if len(results) > 1:
         add_legend(figure, 2)
     label = f"Growth of the map. {'; '.join(words)}."
-    return Drawing("Keyframes and landmarks", label,
-                   "Keyframes that the tracker made, of which the mapper removes those that add nothing; landmarks in the tracker's map.",
-                   to_svg(figure, "map", label))
+    return Drawing(
+        "Keyframes and landmarks",
+        label,
+        "Keyframes that the tracker made, of which the mapper removes those that add nothing; landmarks in the tracker's map.",
+        to_svg(figure, "map", label),
+    )
 
 
 def draw_inliers(results: list[Result]) -> Drawing | None:
-    numbered = numbered_where(results, lambda result: result.frames is not None and np.isfinite(result.frames.inliers).any())
+    numbered = numbered_where(
+        results, lambda result: result.frames is not None and np.isfinite(result.frames.inliers).any()
+    )
     if not numbered:
         return None
     figure = new_figure(*CARD)
@@ -51,8 +68,13 @@ def draw_inliers(results: list[Result]) -> Drawing | None:
     for index, result in numbered:
         frames = result.frames
         seconds = frames.times_s - start_s(result)
-        axes.plot(*thin(seconds, frames.inliers), color=color_of(index), linestyle=dashes_of(index), linewidth=1.2,
-                  label="points on the pose" if len(results) == 1 else short(result.name))
+        axes.plot(
+            *thin(seconds, frames.inliers),
+            color=color_of(index),
+            linestyle=dashes_of(index),
+            linewidth=1.2,
+            label="points on the pose" if len(results) == 1 else short(result.name),
+        )
         lost = np.array([state == "lost" for state in frames.states])
         if lost.any():
             axes.plot(seconds[lost], np.zeros(lost.sum()), "|", color=BAD, markersize=14, label=lost_label)
@@ -61,5 +83,9 @@ def draw_inliers(results: list[Result]) -> Drawing | None:
     axes.set(xlabel="time in the source [s]", ylabel="points", ylim=(0, None))
     add_legend(figure, 2)
     label = f"Landmarks that agree with the pose of each frame. {'; '.join(words)}."
-    return Drawing("How well each frame was held", label, "Landmarks found in the image that agree with its pose; red marks are lost frames.",
-                   to_svg(figure, "matches", label))
+    return Drawing(
+        "How well each frame was held",
+        label,
+        "Landmarks found in the image that agree with its pose; red marks are lost frames.",
+        to_svg(figure, "matches", label),
+    )

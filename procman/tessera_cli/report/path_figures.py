@@ -3,10 +3,22 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from tessera_cli.report.drawing import CARD, Drawing, add_legend, color_of, dashes_of, mark_loops, numbered_where, short, start_s, thin, width_of
+from tessera_cli.report.drawing import (
+    CARD,
+    Drawing,
+    add_legend,
+    color_of,
+    dashes_of,
+    mark_loops,
+    numbered_where,
+    short,
+    start_s,
+    thin,
+    width_of,
+)
+from tessera_cli.report.svg import BAD, INK, NUM_SERIES, TRUTH, new_figure, to_svg
 from tessera_cli.report.trajectory_plot import AXES, widest_axes
 from tessera_cli.runs.run_folder import Result, positions_at
-from tessera_cli.report.svg import BAD, INK, NUM_SERIES, TRUTH, new_figure, to_svg
 
 HERO = (820, 660)  # of the one that is drawn large where there is room
 PHONE_HERO = (380, 400)
@@ -47,16 +59,31 @@ def _names(group: list[tuple[int, Result]]) -> str:
 def _draw_ways(axes: Axes, group: list[tuple[int, Result]], across: int, along: int) -> None:
     first = group[0][1]
     if first.error:
-        axes.plot(*thin(first.truth.positions[:, across], first.truth.positions[:, along]), color=TRUTH, linewidth=4.5, label="ground truth",
-                  solid_capstyle="round")
+        axes.plot(
+            *thin(first.truth.positions[:, across], first.truth.positions[:, along]),
+            color=TRUTH,
+            linewidth=4.5,
+            label="ground truth",
+            solid_capstyle="round",
+        )
     for place, (index, result) in enumerate(group):
         if len(group) == 1 and result.live is not None:
             live = result.in_truth(result.live.positions)
-            axes.plot(*thin(live[:, across], live[:, along]), color=color_of(NUM_SERIES - 1), linewidth=1, linestyle=(0, (4, 2)),
-                      label="as published at the time")
+            axes.plot(
+                *thin(live[:, across], live[:, along]),
+                color=color_of(NUM_SERIES - 1),
+                linewidth=1,
+                linestyle=(0, (4, 2)),
+                label="as published at the time",
+            )
         positions = result.in_truth(result.estimate.positions)
-        axes.plot(*thin(positions[:, across], positions[:, along]), color=color_of(index), linestyle=dashes_of(index),
-                  linewidth=width_of(place, len(group)), label="estimate" if len(group) == 1 else short(result.name))
+        axes.plot(
+            *thin(positions[:, across], positions[:, along]),
+            color=color_of(index),
+            linestyle=dashes_of(index),
+            linewidth=width_of(place, len(group)),
+            label="estimate" if len(group) == 1 else short(result.name),
+        )
     _draw_loops(axes, group, across, along)
     axes.plot(*_reference(group)[0, [across, along]], "o", color=INK, markersize=6, label="start")
 
@@ -66,8 +93,18 @@ def _draw_loops(axes: Axes, group: list[tuple[int, Result]], across: int, along:
     for _, result in group:
         for loop in result.loops:
             ends = result.in_truth(positions_at(result.estimate, [loop.keyframe_s, loop.matched_s]))
-            axes.plot(ends[:, across], ends[:, along], color=BAD, marker="o", markersize=6, markerfacecolor="none", markeredgewidth=1.4,
-                      linewidth=1.4, linestyle="-", label=label)
+            axes.plot(
+                ends[:, across],
+                ends[:, along],
+                color=BAD,
+                marker="o",
+                markersize=6,
+                markerfacecolor="none",
+                markeredgewidth=1.4,
+                linewidth=1.4,
+                linestyle="-",
+                label=label,
+            )
             label = None
 
 
@@ -92,7 +129,11 @@ def _from_above(group: list[tuple[int, Result]], key: str, names: str, is_hero: 
     if any(result.loops for _, result in group):
         note += " Circles mark keyframes that saw a known place again, a line between them leads to the one they were matched with."
     title, small = f"The way from above{names}", draw(PHONE_HERO, f"{key}-small", 2)
-    return Drawing(title, label, note, draw(HERO, key, 5), small, is_hero=True) if is_hero else Drawing(title, label, note, small)
+    return (
+        Drawing(title, label, note, draw(HERO, key, 5), small, is_hero=True)
+        if is_hero
+        else Drawing(title, label, note, small)
+    )
 
 
 def _from_side(group: list[tuple[int, Result]], key: str, names: str) -> Drawing:
@@ -106,8 +147,12 @@ def _from_side(group: list[tuple[int, Result]], key: str, names: str) -> Drawing
         axes.invert_yaxis()  # a camera's y axis points down
     axes.set(xlabel=f"{AXES[across]} [{unit}]", ylabel=f"{AXES[upright]} [{unit}]")
     label = _label_of_ways(group, f"seen from the side, {AXES[across]} and {AXES[upright]}")
-    return Drawing(f"The way from the side{names}", label, "The third axis against the longest; the two have different scales.",
-                   to_svg(figure, key, label))
+    return Drawing(
+        f"The way from the side{names}",
+        label,
+        "The third axis against the longest; the two have different scales.",
+        to_svg(figure, key, label),
+    )
 
 
 def _label_of_ways(group: list[tuple[int, Result]], view: str) -> str:
@@ -128,15 +173,27 @@ def draw_errors(results: list[Result]) -> Drawing | None:
     for place, (index, result) in enumerate(numbered):
         error = result.error
         seconds = error.timestamps_s - (start_s(result) if has_times else 0.0)
-        axes.plot(*thin(seconds, error.errors_m), color=color_of(index), linestyle=dashes_of(index),
-                  linewidth=width_of(place, len(numbered)), label="error" if len(results) == 1 else short(result.name))
+        axes.plot(
+            *thin(seconds, error.errors_m),
+            color=color_of(index),
+            linestyle=dashes_of(index),
+            linewidth=width_of(place, len(numbered)),
+            label="error" if len(results) == 1 else short(result.name),
+        )
         if len(results) == 1:
             axes.axhline(error.rms_m, color=INK, linestyle="--", linewidth=1, label=f"RMS {error.rms_m:.3f} m")
     if has_times:
         mark_loops(axes, numbered)
     axes.set(xlabel="time [s]" if has_times else "frame", ylabel="error [m]", ylim=(0, None))
     add_legend(figure, 3 if len(results) == 1 else 2)
-    worst = "; ".join(f"{result.name}: RMS {result.error.rms_m:.3f} m, at most {result.error.errors_m.max():.3f} m" for _, result in numbered)
+    worst = "; ".join(
+        f"{result.name}: RMS {result.error.rms_m:.3f} m, at most {result.error.errors_m.max():.3f} m"
+        for _, result in numbered
+    )
     label = f"Distance between estimated and true position along the way. {worst}."
-    return Drawing("Error along the way", label, "Distance from the true position, after the alignment of the whole way.",
-                   to_svg(figure, "errors", label))
+    return Drawing(
+        "Error along the way",
+        label,
+        "Distance from the true position, after the alignment of the whole way.",
+        to_svg(figure, "errors", label),
+    )

@@ -36,8 +36,11 @@ def _tracked(result: Result) -> str:
     if tracked == frames:
         return f"All {frames:,} frames were tracked."
     if tracked + before == frames:
-        return f"All {frames:,} frames were tracked but the first {before:,}, with which the map began." if before > 1 else \
-            f"All {frames:,} frames were tracked but the first, with which the map began."
+        return (
+            f"All {frames:,} frames were tracked but the first {before:,}, with which the map began."
+            if before > 1
+            else f"All {frames:,} frames were tracked but the first, with which the map began."
+        )
     return f"{tracked:,} of {frames:,} frames were tracked ({100 * tracked / max(frames, 1):.1f} %)."
 
 
@@ -47,8 +50,10 @@ def _error(result: Result) -> str:
         return f"There is no error to tell: {result.error_note}." if result.error_note else ""
     way = length_m(error.truth)
     share = f", {100 * error.rms_m / way:.2f} % of the way's {way:,.0f} m" if way > 1 else ""
-    return (f"The estimated positions are {error.rms_m:.3f} m (RMS) from the true ones{share}, after alignment by {error.alignment}"
-            + (f" with scale {error.scale:.4g}." if error.alignment == "Sim(3)" else "."))
+    return (
+        f"The estimated positions are {error.rms_m:.3f} m (RMS) from the true ones{share}, after alignment by {error.alignment}"
+        + (f" with scale {error.scale:.4g}." if error.alignment == "Sim(3)" else ".")
+    )
 
 
 def _speed(result: Result) -> str:
@@ -59,8 +64,11 @@ def _speed(result: Result) -> str:
     times_s = result.frames.times_s if result.frames is not None else np.zeros(0)
     if len(times_s) > 1 and times_s[-1] > times_s[0]:
         of_camera = (len(times_s) - 1) / (times_s[-1] - times_s[0])
-        sentence += f", {rate / of_camera:.1f} times as fast as the camera took them" if rate > 1.05 * of_camera else \
-            f"; the camera took {of_camera:.1f}"
+        sentence += (
+            f", {rate / of_camera:.1f} times as fast as the camera took them"
+            if rate > 1.05 * of_camera
+            else f"; the camera took {of_camera:.1f}"
+        )
     return sentence + "."
 
 
@@ -91,11 +99,15 @@ def remarks(result: Result) -> list[str]:
     elif ended != "complete":
         found.append(f"The run failed: {ended}")
     if dropped := summary.get("frames_dropped"):
-        found.append(f"{count(dropped, 'frame')} never reached the tracker: they came faster than they could be handled.")
+        found.append(
+            f"{count(dropped, 'frame')} never reached the tracker: they came faster than they could be handled."
+        )
     found += _lost(result)
     if (wait := summary.get("map_wait_ms")) and wait["p95"] >= NOTABLE_WAIT_MS:
-        found.append(f"The tracker waited for the mapper {wait['mean']:.1f} ms a frame on average, {wait['p95']:.0f} ms or more in one "
-                     "frame of twenty: mapping is what holds the run up.")
+        found.append(
+            f"The tracker waited for the mapper {wait['mean']:.1f} ms a frame on average, {wait['p95']:.0f} ms or more in one "
+            "frame of twenty: mapping is what holds the run up."
+        )
     found += _messages(summary)
     if restarts := summary.get("extractor_restarts"):
         found.append(f"Extractors were started again {count(restarts, 'time')}; nothing was lost by it.")
@@ -111,18 +123,24 @@ def _lost(result: Result) -> list[str]:
     # Numbers in a row have the same distance from their place in the list.
     runs = [list(run) for _, run in itertools.groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0])]
     ranges = [f"{run[0][1]} to {run[-1][1]}" if len(run) > 1 else str(run[0][1]) for run in runs]
-    more = f" and {count(len(ranges) - MAX_RANGES, 'more stretch', 'more stretches')}" if len(ranges) > MAX_RANGES else ""
+    more = (
+        f" and {count(len(ranges) - MAX_RANGES, 'more stretch', 'more stretches')}" if len(ranges) > MAX_RANGES else ""
+    )
     return [f"{count(len(numbers), 'frame')} found no pose: {', '.join(ranges[:MAX_RANGES])}{more}."]
 
 
 def _messages(summary: dict) -> list[str]:
     found = []
     if repaired := summary.get("messages_repaired"):
-        found.append(f"{count(repaired, 'message')} got lost on the way and {'was' if repaired == 1 else 'were'} sent again; "
-                     "nothing is missing.")
+        found.append(
+            f"{count(repaired, 'message')} got lost on the way and {'was' if repaired == 1 else 'were'} sent again; "
+            "nothing is missing."
+        )
     if lost := summary.get("messages_lost"):
         found.append(f"{count(lost, 'message')} stayed lost: the run may not be repeatable.")
     if undecodable := summary.get("messages_undecodable"):
-        found.append(f"{count(undecodable, 'message')} made no sense and {'was' if undecodable == 1 else 'were'} left aside: does another "
-                     "program speak on this bus?")
+        found.append(
+            f"{count(undecodable, 'message')} made no sense and {'was' if undecodable == 1 else 'were'} left aside: does another "
+            "program speak on this bus?"
+        )
     return found

@@ -16,21 +16,52 @@ XLINK = "http://www.w3.org/1999/xlink"
 INK, GRID, TRUTH, BAD = "#0a0b01", "#0a0b02", "#0a0b03", "#0a0b04"
 NUM_SERIES = 8
 SERIES = [f"#0a0c{number:02x}" for number in range(1, NUM_SERIES + 1)]
-VARIABLES = {INK: "--ink", GRID: "--grid", TRUTH: "--truth", BAD: "--bad",
-             **{color: f"--series-{number}" for number, color in enumerate(SERIES, start=1)}}
+VARIABLES = {
+    INK: "--ink",
+    GRID: "--grid",
+    TRUTH: "--truth",
+    BAD: "--bad",
+    **{color: f"--series-{number}" for number, color in enumerate(SERIES, start=1)},
+}
 # Texts stay texts: readable for screen readers and searchable; the page gives them its font.
-STYLE = {"svg.fonttype": "none", "font.size": 12, "axes.titlesize": 12, "axes.labelsize": 12, "xtick.labelsize": 11,
-         "ytick.labelsize": 11, "legend.fontsize": 11, "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": GRID,
-         "axes.titlecolor": INK, "xtick.color": GRID, "ytick.color": GRID, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
-         "axes.facecolor": "none", "figure.facecolor": "none", "savefig.facecolor": "none", "grid.color": GRID,
-         "grid.linewidth": 0.6, "axes.grid": True, "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
-         "legend.frameon": False, "lines.linewidth": 1.5, "path.simplify_threshold": 0.3, "axes.formatter.useoffset": False}
+STYLE = {
+    "svg.fonttype": "none",
+    "font.size": 12,
+    "axes.titlesize": 12,
+    "axes.labelsize": 12,
+    "xtick.labelsize": 11,
+    "ytick.labelsize": 11,
+    "legend.fontsize": 11,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GRID,
+    "axes.titlecolor": INK,
+    "xtick.color": GRID,
+    "ytick.color": GRID,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "axes.facecolor": "none",
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "path.simplify_threshold": 0.3,
+    "axes.formatter.useoffset": False,
+}
 POINTS_PER_INCH = 72
 
 
 def new_figure(width: float, height: float) -> Figure:
     """`width` and `height` in the SVG's own units, in which texts are 11 and 12 high. Use within `drawing_style()`."""
-    figure = Figure(figsize=(width / POINTS_PER_INCH, height / POINTS_PER_INCH), dpi=POINTS_PER_INCH, layout="constrained")
+    figure = Figure(
+        figsize=(width / POINTS_PER_INCH, height / POINTS_PER_INCH), dpi=POINTS_PER_INCH, layout="constrained"
+    )
     figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03)
     return figure
 

@@ -45,6 +45,8 @@ def _line(pictures: list[np.ndarray], row: int, colored: bool) -> str:
     estimate, together = pictures[-1][row], np.bitwise_or.reduce([picture[row] for picture in pictures])
     characters = [chr(BLANK + bits) for bits in together]
     if colored:
-        characters = [f"{BLUE if is_estimate else GREY}{character}{PLAIN}" if character != chr(BLANK) else character
-                      for character, is_estimate in zip(characters, estimate)]
+        characters = [
+            f"{BLUE if is_estimate else GREY}{character}{PLAIN}" if character != chr(BLANK) else character
+            for character, is_estimate in zip(characters, estimate)
+        ]
     return "".join(characters)

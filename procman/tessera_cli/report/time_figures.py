@@ -4,20 +4,26 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tessera_cli.report.drawing import CARD, Drawing, add_legend, color_of, dashes_of, in_order, numbered_where, short
-from tessera_cli.runs.run_folder import Result
 from tessera_cli.report.svg import INK, new_figure, to_svg
+from tessera_cli.runs.run_folder import Result
 
 RATE_BINS = (8, 60)
 # The launcher shows more extractors than this as one, and so does the report.
 MAX_EXTRACTORS = 4
-TIMES = (("pose_time_ms", "pose time [ms]", "from one pose to the next"), ("latency_ms", "latency [ms]", "from a frame to its pose"),
-         ("map_wait_ms", "wait for the map [ms]", "of the tracker"))
+TIMES = (
+    ("pose_time_ms", "pose time [ms]", "from one pose to the next"),
+    ("latency_ms", "latency [ms]", "from a frame to its pose"),
+    ("map_wait_ms", "wait for the map [ms]", "of the tracker"),
+)
 
 
 def draw_pose_times(results: list[Result]) -> Drawing | None:
     numbered = numbered_where(results, lambda result: result.frames is not None)
-    measures = [(name, axis, words) for name, axis, words in TIMES
-                if any(np.isfinite(getattr(result.frames, name)).any() for _, result in numbered)]
+    measures = [
+        (name, axis, words)
+        for name, axis, words in TIMES
+        if any(np.isfinite(getattr(result.frames, name)).any() for _, result in numbered)
+    ]
     if not measures:
         return None
     figure = new_figure(CARD[0], max(CARD[1], 40 + len(measures) * (50 + 22 * len(numbered))))
@@ -29,18 +35,35 @@ def draw_pose_times(results: list[Result]) -> Drawing | None:
         names = [short(result.name) for _, result in numbered] if len(numbered) > 1 else [""]
         axes.set_yticks(range(len(names)), names)
         axes.set(xlabel=f"{axis}, {meaning}", xlim=(0, None))
-        words += [f"{result.name}: {axis} median {np.median(sample):.1f}, 95 percent below {np.percentile(sample, 95):.1f}"
-                  for (_, result), sample in zip(numbered, samples) if len(sample)]
+        words += [
+            f"{result.name}: {axis} median {np.median(sample):.1f}, 95 percent below {np.percentile(sample, 95):.1f}"
+            for (_, result), sample in zip(numbered, samples)
+            if len(sample)
+        ]
     label = f"Boxplots of the time per frame. {'; '.join(words)}."
-    return Drawing("Time per frame", label, "Box: half of all frames; line in it: median; whiskers: 5 % and 95 %; diamond: 99 %.",
-                   to_svg(figure, "times", label))
+    return Drawing(
+        "Time per frame",
+        label,
+        "Box: half of all frames; line in it: median; whiskers: 5 % and 95 %; diamond: 99 %.",
+        to_svg(figure, "times", label),
+    )
 
 
 def _draw_boxes(axes: Axes, samples: list[np.ndarray], colors: list[str]) -> None:
     """Horizontal, the first on top."""
-    drawn = axes.boxplot([sample if len(sample) else [np.nan] for sample in samples], positions=range(len(samples)), orientation="horizontal",
-                         widths=0.6, whis=(5, 95), showfliers=False, patch_artist=True, manage_ticks=False,
-                         medianprops={"color": INK, "linewidth": 2}, whiskerprops={"color": INK}, capprops={"color": INK})
+    drawn = axes.boxplot(
+        [sample if len(sample) else [np.nan] for sample in samples],
+        positions=range(len(samples)),
+        orientation="horizontal",
+        widths=0.6,
+        whis=(5, 95),
+        showfliers=False,
+        patch_artist=True,
+        manage_ticks=False,
+        medianprops={"color": INK, "linewidth": 2},
+        whiskerprops={"color": INK},
+        capprops={"color": INK},
+    )
     for row, (box, sample, color) in enumerate(zip(drawn["boxes"], samples, colors)):
         box.set(facecolor=color, edgecolor=INK, linewidth=0.8)
         if len(sample):
@@ -60,17 +83,33 @@ def process_values(by_process: dict[str, float]) -> dict[str, float]:
 
 def draw_cpu(results: list[Result]) -> Drawing | None:
     by_result = [process_values(result.summary.get("cpu_s") or {}) for result in results]
-    return _draw_bars(results, by_result, "CPU per process", "CPU time [s]", "CPU seconds of each process",
-                      "What the kernel accounted to each process over the whole run.")
+    return _draw_bars(
+        results,
+        by_result,
+        "CPU per process",
+        "CPU time [s]",
+        "CPU seconds of each process",
+        "What the kernel accounted to each process over the whole run.",
+    )
 
 
 def draw_steps(results: list[Result]) -> Drawing | None:
-    by_result = [{name: step["median"] for name, step in (result.summary.get("stage_ms") or {}).items()} for result in results]
-    return _draw_bars(results, by_result, "One step of each process", "median step [ms]", "Median milliseconds of one step of each process",
-                      "A step is a frame, a tile of one for extractors, a keyframe for the mapper.")
+    by_result = [
+        {name: step["median"] for name, step in (result.summary.get("stage_ms") or {}).items()} for result in results
+    ]
+    return _draw_bars(
+        results,
+        by_result,
+        "One step of each process",
+        "median step [ms]",
+        "Median milliseconds of one step of each process",
+        "A step is a frame, a tile of one for extractors, a keyframe for the mapper.",
+    )
 
 
-def _draw_bars(results: list[Result], by_result: list[dict[str, float]], title: str, axis: str, meaning: str, note: str) -> Drawing | None:
+def _draw_bars(
+    results: list[Result], by_result: list[dict[str, float]], title: str, axis: str, meaning: str, note: str
+) -> Drawing | None:
     """`by_result`: for each result, its processes' values; a result without any gets no bars."""
     processes = in_order(list({name for values in by_result for name in values}))
     if not processes:
@@ -81,8 +120,13 @@ def _draw_bars(results: list[Result], by_result: list[dict[str, float]], title: 
     thickness = 0.8 / len(drawn)
     for place, index in enumerate(drawn):
         rows = np.arange(len(processes)) + (place - (len(drawn) - 1) / 2) * thickness
-        bars = axes.barh(rows, [by_result[index].get(name, 0.0) for name in processes], height=thickness * 0.9, color=color_of(index),
-                         label=short(results[index].name))
+        bars = axes.barh(
+            rows,
+            [by_result[index].get(name, 0.0) for name in processes],
+            height=thickness * 0.9,
+            color=color_of(index),
+            label=short(results[index].name),
+        )
         axes.bar_label(bars, fmt="%.1f", padding=3, color=INK, fontsize=11)
     axes.set_yticks(range(len(processes)), processes)
     axes.invert_yaxis()
@@ -91,13 +135,18 @@ def _draw_bars(results: list[Result], by_result: list[dict[str, float]], title: 
     axes.grid(axis="y", visible=False)
     if len(results) > 1:
         add_legend(figure, 2)
-    words = "; ".join(f"{results[index].name}: " + ", ".join(f"{name} {value:.1f}" for name, value in by_result[index].items()) for index in drawn)
+    words = "; ".join(
+        f"{results[index].name}: " + ", ".join(f"{name} {value:.1f}" for name, value in by_result[index].items())
+        for index in drawn
+    )
     label = f"{meaning}. {words}."
     return Drawing(title, label, note, to_svg(figure, title, label))
 
 
 def draw_frame_rate(results: list[Result]) -> Drawing | None:
-    numbered = numbered_where(results, lambda result: result.frames is not None and np.nansum(result.frames.pose_time_ms) > 0)
+    numbered = numbered_where(
+        results, lambda result: result.frames is not None and np.nansum(result.frames.pose_time_ms) > 0
+    )
     if not numbered:
         return None
     figure = new_figure(*CARD)
@@ -108,14 +157,33 @@ def draw_frame_rate(results: list[Result]) -> Drawing | None:
         num_bins = int(np.clip(published_s[-1], *RATE_BINS))
         counts, edges = np.histogram(published_s, bins=num_bins, range=(0.0, published_s[-1]))
         rate = counts / np.diff(edges)
-        axes.stairs(rate, edges, color=color_of(index), linestyle=dashes_of(index), linewidth=1.8, baseline=None,
-                    label="poses per second" if len(results) == 1 else short(result.name))
-        words.append(f"{result.name}: between {rate.min():.0f} and {rate.max():.0f}, {len(published_s) / published_s[-1]:.1f} over all")
+        axes.stairs(
+            rate,
+            edges,
+            color=color_of(index),
+            linestyle=dashes_of(index),
+            linewidth=1.8,
+            baseline=None,
+            label="poses per second" if len(results) == 1 else short(result.name),
+        )
+        words.append(
+            f"{result.name}: between {rate.min():.0f} and {rate.max():.0f}, {len(published_s) / published_s[-1]:.1f} over all"
+        )
     times_s = numbered[0][1].frames.times_s
     if len(times_s) > 1 and times_s[-1] > times_s[0]:
-        axes.axhline((len(times_s) - 1) / (times_s[-1] - times_s[0]), color=INK, linestyle="--", linewidth=1, label="the camera's own")
+        axes.axhline(
+            (len(times_s) - 1) / (times_s[-1] - times_s[0]),
+            color=INK,
+            linestyle="--",
+            linewidth=1,
+            label="the camera's own",
+        )
     axes.set(xlabel="time of the run [s]", ylabel="frames per second", ylim=(0, None))
     add_legend(figure, 2)
     label = f"Frames per second over the run. {'; '.join(words)}."
-    return Drawing("Frame rate", label, "Poses published per second; above the dashed line the stack is faster than the camera was.",
-                   to_svg(figure, "rate", label))
+    return Drawing(
+        "Frame rate",
+        label,
+        "Poses published per second; above the dashed line the stack is faster than the camera was.",
+        to_svg(figure, "rate", label),
+    )

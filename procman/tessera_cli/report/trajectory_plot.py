@@ -37,7 +37,16 @@ def draw_loops(axes, result: Result, across: int, along: int) -> None:
     label = f"{len(result.loops)} {'loop' if len(result.loops) == 1 else 'loops'} closed"
     for loop in result.loops:
         ends = result.in_truth(positions_at(result.estimate, [loop.keyframe_s, loop.matched_s]))
-        axes.plot(ends[:, across], ends[:, along], color="tab:red", marker="o", markersize=6, markerfacecolor="none", linewidth=1.2, label=label)
+        axes.plot(
+            ends[:, across],
+            ends[:, along],
+            color="tab:red",
+            marker="o",
+            markersize=6,
+            markerfacecolor="none",
+            linewidth=1.2,
+            label=label,
+        )
         label = None
 
 
@@ -47,8 +56,13 @@ def plot_error(result: Result, title: str, path: Path) -> None:
     from_above, along_way = figure.subplots(1, 2)
     across, along = widest_axes(error.truth)
     from_above.plot(error.truth[:, across], error.truth[:, along], color="0.7", linewidth=4, label="ground truth")
-    from_above.plot(error.estimate[:, across], error.estimate[:, along], color="tab:blue", linewidth=1.2,
-                    label=f"estimate, {error.alignment} aligned")
+    from_above.plot(
+        error.estimate[:, across],
+        error.estimate[:, along],
+        color="tab:blue",
+        linewidth=1.2,
+        label=f"estimate, {error.alignment} aligned",
+    )
     draw_loops(from_above, result, across, along)
     draw_path(from_above, error.truth, across, along, "m")
     seconds = error.timestamps_s - error.timestamps_s[0]

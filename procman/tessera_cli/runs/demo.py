@@ -10,18 +10,25 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from tessera_cli.runs import recording as record
-from tessera_cli.runs import launcher as run
 from tessera_cli.cli.arguments import parse_arguments
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT
+from tessera_cli.runs import launcher as run
+from tessera_cli.runs import recording as record
 from tessera_cli.runs.sources import parse_source
 
 SCENE = "street-short"
 SENSOR = "stereo"
 # Everything that a frame passes through on its way into a log.
-RENDERED_BY = ("lcmtypes", "modules/core", "modules/geometry", "modules/simulation", "modules/datasets", "modules/transport",
-               "modules/stages/camera")
+RENDERED_BY = (
+    "lcmtypes",
+    "modules/core",
+    "modules/geometry",
+    "modules/simulation",
+    "modules/datasets",
+    "modules/transport",
+    "modules/stages/camera",
+)
 SUFFIXES = (".cc", ".h", ".lcm")
 PICTURE_COLUMNS, PICTURE_LINES = 64, 24
 
@@ -36,8 +43,22 @@ def main(arguments: Namespace) -> int:
     else:
         _render(log, arguments.frames)
     out = arguments.out or folder / f"{datetime.datetime.now():%Y-%m-%d-%H%M%S}-demo"
-    replay = parse_arguments(["replay", str(log), "--sensor", SENSOR, "--extractors", "2", "--tiles", "2x2", "--port", str(arguments.port),
-                              "--out", str(out)])
+    replay = parse_arguments(
+        [
+            "replay",
+            str(log),
+            "--sensor",
+            SENSOR,
+            "--extractors",
+            "2",
+            "--tiles",
+            "2x2",
+            "--port",
+            str(arguments.port),
+            "--out",
+            str(out),
+        ]
+    )
     return run.main(replay, _tell)
 
 
@@ -67,13 +88,21 @@ def _render(log: Path, num_frames: int) -> None:
 
 
 def _tell(summary: dict, folder: Path) -> str:
-    from tessera_cli.runs.run_folder import read_run
     from tessera_cli.report.sentences import headline, remarks
+    from tessera_cli.runs.run_folder import read_run
 
     result = read_run(folder)
     lines = [*headline(result)] + (remarks(result) if summary["ended"] != "complete" else [])
-    return "\n".join(["", *_picture(result), *lines, "", f"picture: {folder / 'trajectory.png'}",
-                      f"report:  {folder / 'report.html'}  (open it in a browser)"])
+    return "\n".join(
+        [
+            "",
+            *_picture(result),
+            *lines,
+            "",
+            f"picture: {folder / 'trajectory.png'}",
+            f"report:  {folder / 'report.html'}  (open it in a browser)",
+        ]
+    )
 
 
 def _picture(result) -> list[str]:
@@ -83,5 +112,9 @@ def _picture(result) -> list[str]:
     if result.estimate is None or not sys.stdout.isatty():
         return []
     columns, lines = shutil.get_terminal_size()
-    return ["The way from above, blue over the true one in grey:", "",
-            draw_from_above(result, min(columns - 2, PICTURE_COLUMNS), min(lines // 2, PICTURE_LINES), colored=True), ""]
+    return [
+        "The way from above, blue over the true one in grey:",
+        "",
+        draw_from_above(result, min(columns - 2, PICTURE_COLUMNS), min(lines // 2, PICTURE_LINES), colored=True),
+        "",
+    ]

@@ -10,15 +10,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tessera_cli import settings
-from tessera_cli.supervision.stack_monitor import BusListener
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import ROOT
 from tessera_cli.interrupt import Interrupt
-from tessera_cli.supervision.private_deputy import PrivateDeputy
-from tessera_cli.supervision.process_list import read_process_list
-from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.runs.live_view import make_view
 from tessera_cli.runs.sources import Source, parse_source
+from tessera_cli.supervision.private_deputy import PrivateDeputy
+from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.stack_monitor import BusListener
+from tessera_cli.supervision.state_folder import LogFolder
 
 PROCESS_LIST = ROOT / "procman" / "local.pmd"
 
@@ -33,8 +33,23 @@ MAP_STAGES = ("mapper", "loop_closer", "global_adjuster")
 DRAIN_TIMEOUT_S = 3.0
 LISTEN_MS = 50
 # What a run leaves in its folder; those of an earlier run in the same folder must not be taken for this one's.
-RUN_FILES = ("summary.json", "run.json", "report.html", "trajectory.png", "trajectory.txt", "trajectory_live.txt", "trajectory_kitti.txt",
-             "keyframes.txt", "map.ply", "map.tessera", "ground_truth.txt", "frames.csv", "loops.csv", "run.lcmlog", "settings.yaml")
+RUN_FILES = (
+    "summary.json",
+    "run.json",
+    "report.html",
+    "trajectory.png",
+    "trajectory.txt",
+    "trajectory_live.txt",
+    "trajectory_kitti.txt",
+    "keyframes.txt",
+    "map.ply",
+    "map.tessera",
+    "ground_truth.txt",
+    "frames.csv",
+    "loops.csv",
+    "run.lcmlog",
+    "settings.yaml",
+)
 
 
 def main(arguments: Namespace, tell: Callable[[dict, Path], str] | None = None) -> int:
@@ -52,7 +67,11 @@ def main(arguments: Namespace, tell: Callable[[dict, Path], str] | None = None) 
 
 def _counts(arguments: Namespace, source: Source) -> dict[str, int]:
     """How many processes of the list's commands this run has, where that depends on it."""
-    return {"extractor": arguments.extractors, "recorder": int(arguments.record), "camera": int(source.has_camera_process)}
+    return {
+        "extractor": arguments.extractors,
+        "recorder": int(arguments.record),
+        "camera": int(source.has_camera_process),
+    }
 
 
 def _choose_folder(out: str | None, source: Source) -> Path:
@@ -68,15 +87,26 @@ def _remove_earlier_run(folder: Path) -> None:
 
 
 class Launcher:
-    def __init__(self, arguments: Namespace, source: Source, folder: Path, values: dict, deputy: PrivateDeputy,
-                 tell: Callable[[dict, Path], str] | None):
+    def __init__(
+        self,
+        arguments: Namespace,
+        source: Source,
+        folder: Path,
+        values: dict,
+        deputy: PrivateDeputy,
+        tell: Callable[[dict, Path], str] | None,
+    ) -> None:
         self._arguments = arguments
         self._tell = tell
         self._source = source
         self._folder = folder
         self._deputy = deputy
-        self._bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns,
-                                shares_extractors=arguments.extractors == 0)
+        self._bus = BusListener(
+            values["bus"]["main_url"],
+            values["bus"]["channel_prefix"],
+            deputy.owns,
+            shares_extractors=arguments.extractors == 0,
+        )
         self._interrupt = Interrupt()
         self._num_warnings_said = 0
         self._map_busy_at = 0.0  # monotonic seconds
@@ -116,8 +146,10 @@ class Launcher:
             if self._interrupt.requested:
                 return
             if time.monotonic() > deadline:
-                raise RunFailed(f"{', '.join(waiting)} did not say within {START_TIMEOUT_S:.0f} s that it runs; "
-                                f"its log is in {self._folder / 'stages'}.")
+                raise RunFailed(
+                    f"{', '.join(waiting)} did not say within {START_TIMEOUT_S:.0f} s that it runs; "
+                    f"its log is in {self._folder / 'stages'}."
+                )
             self._look(view)
         if not self._source.has_camera_process:
             view.say("waiting for frames on the bus; Ctrl-C ends the run")
@@ -154,10 +186,14 @@ class Launcher:
         self._deputy.hear(self._bus.progress.stages.values())
         self._deputy.step()
         if ended := self._deputy.ended:
-            raise RunFailed(f"{ended[0]} ended before the run did; the last line of its log: {self._deputy.last_words(ended[0])}")
+            raise RunFailed(
+                f"{ended[0]} ended before the run did; the last line of its log: {self._deputy.last_words(ended[0])}"
+            )
         if foreign := self._bus.foreign:
-            raise UserError(f"another stack runs on this bus ({foreign}): end it, or give --port N to keep the two apart.")
-        for warning in self._deputy.warnings[self._num_warnings_said:]:
+            raise UserError(
+                f"another stack runs on this bus ({foreign}): end it, or give --port N to keep the two apart."
+            )
+        for warning in self._deputy.warnings[self._num_warnings_said :]:
             view.say(warning)
         self._num_warnings_said = len(self._deputy.warnings)
 
@@ -171,15 +207,24 @@ class Launcher:
         if self._source.is_live or (idle_s < STALL_TIMEOUT_S and waited_s < ADJUSTMENT_TIMEOUT_S):
             return
         errors = [f"{report.name}: {report.last_error}" for report in progress.stages.values() if report.last_error]
-        raise RunFailed(f"no pose for {waited_s:.0f} s after {progress.num_poses} frames; "
-                        + (errors[-1] if errors else f"the logs are in {self._folder / 'stages'}."))
+        raise RunFailed(
+            f"no pose for {waited_s:.0f} s after {progress.num_poses} frames; "
+            + (errors[-1] if errors else f"the logs are in {self._folder / 'stages'}.")
+        )
 
     def _summarize(self, wall_s: float, ended: str) -> dict:
         from tessera_cli.runs.summary import RunFacts, summarize
 
         undecodable = sum(report.undecodable for report in self._bus.progress.stages.values())
-        facts = RunFacts(source=self._source.text or "bus:", sensor=self._arguments.sensor, extractors=self._arguments.extractors,
-                         tiles=self._arguments.tiles, wall_s=wall_s, ended=ended, messages_undecodable=undecodable)
+        facts = RunFacts(
+            source=self._source.text or "bus:",
+            sensor=self._arguments.sensor,
+            extractors=self._arguments.extractors,
+            tiles=self._arguments.tiles,
+            wall_s=wall_s,
+            ended=ended,
+            messages_undecodable=undecodable,
+        )
         return summarize(self._folder, facts, self._deputy)
 
     def _print_summary(self, wall_s: float, ended: str) -> None:

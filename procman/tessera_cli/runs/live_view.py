@@ -29,7 +29,7 @@ def describe_time(seconds: float | None) -> str:
 class Lines:
     """For logs and pipes."""
 
-    def __init__(self, title: str):
+    def __init__(self, title: str) -> None:
         self._last = time.monotonic()
         print(f"tessera: {title}", flush=True)
 
@@ -47,15 +47,18 @@ class Lines:
             return
         self._last = time.monotonic()
         of_all = f" of {progress.num_frames}" if progress.num_frames else ""
-        print(f"tessera: frame {progress.num_poses}{of_all}, {progress.frames_per_s:.1f}/s, "
-              f"{describe_time(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
-              f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, {progress.num_dropped} dropped", flush=True)
+        print(
+            f"tessera: frame {progress.num_poses}{of_all}, {progress.frames_per_s:.1f}/s, "
+            f"{describe_time(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
+            f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, {progress.num_dropped} dropped",
+            flush=True,
+        )
 
 
 class CountLines:
     """One number that grows, for logs and pipes."""
 
-    def __init__(self, title: str, total: int | None):
+    def __init__(self, title: str, total: int | None) -> None:
         self._last = time.monotonic()
         self._title = title
         self._of_all = f" of {total}" if total else ""
@@ -75,11 +78,18 @@ class CountLines:
 class CountBar:
     """The same as a bar, redrawn in place."""
 
-    def __init__(self, title: str, total: int | None):
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, TextColumn, TimeRemainingColumn
+    def __init__(self, title: str, total: int | None) -> None:
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
 
-        self._bars = Bars(TextColumn("tessera: {task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn("frames"),
-                          TimeRemainingColumn(), TextColumn("left"))
+        self._bars = Bars(
+            TextColumn("tessera: {task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("frames"),
+            TimeRemainingColumn(),
+            TextColumn("left"),
+        )
         self._task = self._bars.add_task(title, total=total)
 
     def __enter__(self):
@@ -96,7 +106,7 @@ class CountBar:
 class Panel:
     """Redrawn in place. Fits 80 columns."""
 
-    def __init__(self, title: str):
+    def __init__(self, title: str) -> None:
         from rich.console import Console
         from rich.live import Live
 
@@ -127,7 +137,12 @@ class Panel:
         from rich.text import Text
 
         content = Group(_draw_bar(progress), Text(_tracking_line(progress)), _draw_stages(progress))
-        return Frame(content, title=Text(self._title, overflow="ellipsis"), box=box.ROUNDED, width=min(80, self._live.console.width))
+        return Frame(
+            content,
+            title=Text(self._title, overflow="ellipsis"),
+            box=box.ROUNDED,
+            width=min(80, self._live.console.width),
+        )
 
 
 def _draw_bar(progress: Progress):
@@ -139,13 +154,18 @@ def _draw_bar(progress: Progress):
     row.add_column(justify="right", no_wrap=True)
     of_all = f"/{progress.num_frames}" if progress.num_frames else ""
     figures = f"{progress.num_poses}{of_all} frames  {progress.frames_per_s:5.1f}/s  {describe_time(progress.time_left_s)} left"
-    row.add_row(ProgressBar(total=progress.num_frames or None, completed=progress.num_poses, pulse=not progress.num_frames), figures)
+    row.add_row(
+        ProgressBar(total=progress.num_frames or None, completed=progress.num_poses, pulse=not progress.num_frames),
+        figures,
+    )
     return row
 
 
 def _tracking_line(progress: Progress) -> str:
-    return (f"tracking: {progress.tracking_state or 'no pose yet'}  keyframes: {progress.num_keyframes}  "
-            f"landmarks: {progress.num_landmarks}  loops: {progress.num_loops}  dropped: {progress.num_dropped}")
+    return (
+        f"tracking: {progress.tracking_state or 'no pose yet'}  keyframes: {progress.num_keyframes}  "
+        f"landmarks: {progress.num_landmarks}  loops: {progress.num_loops}  dropped: {progress.num_dropped}"
+    )
 
 
 def _draw_stages(progress: Progress):
@@ -172,14 +192,27 @@ def _stage_rows(progress: Progress) -> list[tuple[str, ...]]:
 
 
 def _row(report: StageReport) -> tuple[str, ...]:
-    return (report.name, STATE_NAMES[report.state], str(report.queue), f"{report.step_ms:.2f}", f"{report.cpu_percent:.0f}",
-            f"{report.rss_mb:.0f}", str(report.num_errors))
+    return (
+        report.name,
+        STATE_NAMES[report.state],
+        str(report.queue),
+        f"{report.step_ms:.2f}",
+        f"{report.cpu_percent:.0f}",
+        f"{report.rss_mb:.0f}",
+        str(report.num_errors),
+    )
 
 
 def _combined_row(reports: list[StageReport]) -> tuple[str, ...]:
     """All extractors as one: sums, and the mean of their step times."""
     running = sum(report.state == 1 for report in reports)
     step_ms = sum(report.step_ms for report in reports) / len(reports)
-    return (f"extractors ({len(reports)})", f"{running} run", str(sum(report.queue for report in reports)), f"{step_ms:.2f}",
-            f"{sum(report.cpu_percent for report in reports):.0f}", f"{sum(report.rss_mb for report in reports):.0f}",
-            str(sum(report.num_errors for report in reports)))
+    return (
+        f"extractors ({len(reports)})",
+        f"{running} run",
+        str(sum(report.queue for report in reports)),
+        f"{step_ms:.2f}",
+        f"{sum(report.cpu_percent for report in reports):.0f}",
+        f"{sum(report.rss_mb for report in reports):.0f}",
+        str(sum(report.num_errors for report in reports)),
+    )

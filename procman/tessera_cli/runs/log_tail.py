@@ -13,7 +13,7 @@ SYNC = 0xEDA1DA01
 class LogTail:
     """Reads on from where it was; what is not yet whole waits for the next time."""
 
-    def __init__(self, path: Path, channel: str):
+    def __init__(self, path: Path, channel: str) -> None:
         self._path = path
         self._channel = channel.encode()
         self._position = 0

@@ -7,13 +7,13 @@ from argparse import Namespace
 from pathlib import Path
 
 from tessera_cli import settings
-from tessera_cli.supervision.stack_monitor import BusListener
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.interrupt import Interrupt
-from tessera_cli.supervision.private_deputy import PrivateDeputy, helper
 from tessera_cli.lcm_bus import ttl_of
-from tessera_cli.supervision.state_folder import LogFolder
+from tessera_cli.supervision.private_deputy import PrivateDeputy, helper
 from tessera_cli.supervision.progress import FINISHED
+from tessera_cli.supervision.stack_monitor import BusListener
+from tessera_cli.supervision.state_folder import LogFolder
 
 # A living stage tells its status twice a second.
 SILENT_BUS_S = 5.0
@@ -26,8 +26,11 @@ def main(arguments: Namespace) -> int:
     if path.is_dir() or not path.parent.is_dir():
         raise UserError(f"{path} can't be written: name a file in a folder that exists.")
     make = settings.lan_assignments if ttl_of(arguments) else settings.port_assignments
-    assignments = make(arguments.port) + [f"bus.channel_prefix={arguments.prefix}", f"map_writer.path={path}",
-                                          f"map_writer.follow={str(arguments.follow).lower()}"]
+    assignments = make(arguments.port) + [
+        f"bus.channel_prefix={arguments.prefix}",
+        f"map_writer.path={path}",
+        f"map_writer.follow={str(arguments.follow).lower()}",
+    ]
     with tempfile.TemporaryDirectory(prefix="tessera-map-") as folder:
         values = settings.write_settings(assignments, Path(folder) / "settings.yaml")
         _write_map(values, Path(folder))
@@ -38,10 +41,14 @@ def main(arguments: Namespace) -> int:
 def _write_map(values: dict, folder: Path) -> None:
     # Several may listen at once, each under a name of its own.
     name = f"map_writer_{os.getpid()}"
-    deputy = PrivateDeputy(LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper(name, "map_writer", STOP_TIME_S)])
+    deputy = PrivateDeputy(
+        LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper(name, "map_writer", STOP_TIME_S)]
+    )
     bus = BusListener(values["bus"]["main_url"], values["bus"]["channel_prefix"], deputy.owns)
     if bus.is_free():
-        raise UserError("no stack runs on this bus: start one, or give its --port N and --prefix TEXT (and --lan if it is on other machines).")
+        raise UserError(
+            "no stack runs on this bus: start one, or give its --port N and --prefix TEXT (and --lan if it is on other machines)."
+        )
     interrupt = Interrupt()
     try:
         deputy.start()

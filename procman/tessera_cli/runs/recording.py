@@ -17,12 +17,12 @@ from tessera_cli import settings
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import unfinished
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.messages import end_of_stream_t
+from tessera_cli.runs.live_view import make_count
+from tessera_cli.runs.log_tail import LogTail
+from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.supervision.private_deputy import PrivateDeputy, helper
 from tessera_cli.supervision.state_folder import LogFolder
-from tessera_cli.runs.log_tail import LogTail
-from tessera_cli.runs.live_view import make_count
-from tessera_cli.runs.sources import Source, parse_source
-from tessera_cli.messages import end_of_stream_t
 
 POLL_S = 0.1
 # After Ctrl-C the camera ends its stream and what is written goes to the disk.
@@ -70,11 +70,15 @@ def _check_target(text: str) -> Path:
     return log
 
 
-def _write_log(arguments: Namespace, source: Source, log: Path, folder: Path, interrupt: Interrupt, keep_interrupted: bool) -> None:
+def _write_log(
+    arguments: Namespace, source: Source, log: Path, folder: Path, interrupt: Interrupt, keep_interrupted: bool
+) -> None:
     url = f"file://{log}?mode=w"
     assignments = settings.source_assignments(arguments, source) + settings.user_assignments(arguments)
     settings.write_settings(assignments + [f"bus.main_url={url}", f"bus.camera_url={url}"], folder / "settings.yaml")
-    deputy = PrivateDeputy(LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper("camera", "camera", STOP_TIME_S)])
+    deputy = PrivateDeputy(
+        LogFolder(folder, f"{folder} is in use."), folder / "settings.yaml", [helper("camera", "camera", STOP_TIME_S)]
+    )
     tail = LogTail(_part(log), f"{settings.prefix_of(arguments.settings)}CAMERA")
     first, last = arguments.frames
     try:
@@ -100,7 +104,11 @@ def _wait(deputy: PrivateDeputy, interrupt: Interrupt, show: Callable[[], None],
 
 def count_frames(log: Path, channel_prefix: str) -> int:
     events = lcm.EventLog(str(log), "r")
-    numbers = [end_of_stream_t.decode(event.data).num_frames for event in events if event.channel == f"{channel_prefix}END_OF_STREAM"]
+    numbers = [
+        end_of_stream_t.decode(event.data).num_frames
+        for event in events
+        if event.channel == f"{channel_prefix}END_OF_STREAM"
+    ]
     events.close()
     if not numbers:
         raise RunFailed(f"the camera wrote no end of its stream into {log}.")

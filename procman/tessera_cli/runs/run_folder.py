@@ -65,7 +65,7 @@ class Result:
         return "map units" if self.error is None and self.summary.get("sensor", "mono") == "mono" else "m"
 
     def in_truth(self, positions: np.ndarray) -> np.ndarray:
-        """n x 3 of the estimate's world, where the alignment puts them; as they are without one."""
+        """N x 3 of the estimate's world, where the alignment puts them; as they are without one."""
         return self.error.align(positions) if self.error else positions
 
 
@@ -78,11 +78,22 @@ def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None
     estimate = _read_if_there(folder / "trajectory.txt")
     if truth_path and truth is None:
         raise UserError(f"{truth_path}: holds no pose.")
-    error, note = measure_error(_what_goes_with(truth, estimate, folder), truth, alignment or default_alignment(summary))
-    return Result(name=folder.absolute().name, estimate=estimate, error=error, error_note=note, truth=truth,
-                  live=_read_if_there(folder / "trajectory_live.txt"), summary=summary, frames=read_frames(folder / "frames.csv"),
-                  loops=read_loops(folder / "loops.csv"), settings=_read_settings(folder / "settings.yaml"),
-                  log_warnings=read_log_warnings(folder / "stages"))
+    error, note = measure_error(
+        _what_goes_with(truth, estimate, folder), truth, alignment or default_alignment(summary)
+    )
+    return Result(
+        name=folder.absolute().name,
+        estimate=estimate,
+        error=error,
+        error_note=note,
+        truth=truth,
+        live=_read_if_there(folder / "trajectory_live.txt"),
+        summary=summary,
+        frames=read_frames(folder / "frames.csv"),
+        loops=read_loops(folder / "loops.csv"),
+        settings=_read_settings(folder / "settings.yaml"),
+        log_warnings=read_log_warnings(folder / "stages"),
+    )
 
 
 def read_pair(estimate_path: Path, truth_path: Path, alignment: str | None = None) -> Result:
@@ -97,7 +108,9 @@ def default_alignment(summary: dict) -> str:
     return "sim3" if summary.get("sensor", "mono") == "mono" else "se3"
 
 
-def measure_error(estimate: Trajectory | None, truth: Trajectory | None, alignment: str) -> tuple[TrajectoryError | None, str]:
+def measure_error(
+    estimate: Trajectory | None, truth: Trajectory | None, alignment: str
+) -> tuple[TrajectoryError | None, str]:
     """The error, or None and the reason in words."""
     if truth is None:
         return None, "the source has no ground truth"
@@ -115,7 +128,9 @@ def _what_goes_with(truth: Trajectory | None, estimate: Trajectory | None, folde
 
 
 def _read_if_there(path: Path) -> Trajectory | None:
-    if not path.is_file() or not any(line.strip() and not line.startswith("#") for line in path.read_text().splitlines()):
+    if not path.is_file() or not any(
+        line.strip() and not line.startswith("#") for line in path.read_text().splitlines()
+    ):
         return None
     return read_trajectory(path)
 
@@ -149,10 +164,18 @@ def read_frames(path: Path) -> Frames | None:
         return np.array([float(row[name]) if row.get(name) else np.nan for row in rows])
 
     try:
-        return Frames(times_s=1e-6 * column("utime_us"), states=[row["state"] for row in rows], pose_time_ms=column("pose_time_ms"),
-                      latency_ms=column("latency_ms"), map_wait_ms=column("map_wait_ms"), matches=column("matches"),
-                      inliers=column("inliers"), landmarks=column("landmarks"), is_keyframe=column("is_keyframe") > 0,
-                      numbers=column("frame").astype(int))
+        return Frames(
+            times_s=1e-6 * column("utime_us"),
+            states=[row["state"] for row in rows],
+            pose_time_ms=column("pose_time_ms"),
+            latency_ms=column("latency_ms"),
+            map_wait_ms=column("map_wait_ms"),
+            matches=column("matches"),
+            inliers=column("inliers"),
+            landmarks=column("landmarks"),
+            is_keyframe=column("is_keyframe") > 0,
+            numbers=column("frame").astype(int),
+        )
     except (KeyError, ValueError) as error:
         raise UserError(f"{path}: is no table of frames ({error}).") from error
 
@@ -160,8 +183,10 @@ def read_frames(path: Path) -> Frames | None:
 def read_loops(path: Path) -> list[Loop]:
     """Columns LOOP_COLUMNS; none if there is no file."""
     try:
-        return [Loop(float(row[LOOP_COLUMNS[0]]), float(row[LOOP_COLUMNS[1]]), int(float(row[LOOP_COLUMNS[2]])))
-                for row in _read_rows(path)]
+        return [
+            Loop(float(row[LOOP_COLUMNS[0]]), float(row[LOOP_COLUMNS[1]]), int(float(row[LOOP_COLUMNS[2]])))
+            for row in _read_rows(path)
+        ]
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(f"{path}: is no table of loops; its columns must be {', '.join(LOOP_COLUMNS)}.") from error
 
@@ -170,15 +195,19 @@ def read_log_warnings(folder: Path) -> list[str]:
     """For each process that warned: how often, and its first words."""
     found = []
     for path in sorted(folder.glob("*.log")):
-        lines = [line for line in path.read_text(errors="replace").splitlines() if " warning: " in line or " error: " in line]
+        lines = [
+            line for line in path.read_text(errors="replace").splitlines() if " warning: " in line or " error: " in line
+        ]
         if lines:
             first = lines[0].split(": ", 1)[1]
-            found.append(f"{path.stem} reported {len(lines)} {'problem' if len(lines) == 1 else 'problems'}, the first: {first}")
+            found.append(
+                f"{path.stem} reported {len(lines)} {'problem' if len(lines) == 1 else 'problems'}, the first: {first}"
+            )
     return found
 
 
 def positions_at(trajectory: Trajectory, times_s: list[float]) -> np.ndarray:
-    """n x 3, of the poses at these times; NaN where there is none."""
+    """N x 3, of the poses at these times; NaN where there is none."""
     positions = np.full((len(times_s), 3), np.nan)
     for i, time_s in enumerate(times_s):
         nearest = int(np.argmin(np.abs(trajectory.timestamps_s - time_s)))

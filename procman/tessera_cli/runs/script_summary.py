@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tessera_cli import settings
+from tessera_cli.messages import procman_process_t, procman_status_t
 from tessera_cli.supervision.list_monitor import ListView
 from tessera_cli.supervision.sheriff import Sheriff
-from tessera_cli.messages import procman_process_t, procman_status_t
 
 
 @dataclass
@@ -23,7 +23,7 @@ class Life:
 
 
 class ScriptRun:
-    def __init__(self, sheriff: Sheriff, name: str, assignments: list[str], values: dict):
+    def __init__(self, sheriff: Sheriff, name: str, assignments: list[str], values: dict) -> None:
         """`values`: the settings that `assignments` make."""
         self._name, self._assignments, self._values = name, assignments, values
         self._view = ListView(values["bus"]["main_url"], values["bus"]["channel_prefix"])
@@ -56,8 +56,10 @@ class ScriptRun:
         if self._evaluator is None or not folder:
             return ""
         if self._evaluator.host != os.uname().nodename:
-            return (f"the run is in {folder} on {self._evaluator.host}; there, procman/tessera evaluate {folder} --report FILE.html "
-                    "makes a report of it")
+            return (
+                f"the run is in {folder} on {self._evaluator.host}; there, procman/tessera evaluate {folder} --report FILE.html "
+                "makes a report of it"
+            )
         from tessera_cli.runs.summary import in_words, write_summary
 
         settings.write_settings(self._assignments, Path(folder) / "settings.yaml")
@@ -67,10 +69,14 @@ class ScriptRun:
         from tessera_cli.runs.summary import RunFacts
 
         return RunFacts(
-            source=self._values["camera"]["source"], sensor=self._values["camera"]["sensor"], tiles=self._values["dispatcher"]["tiles"],
+            source=self._values["camera"]["source"],
+            sensor=self._values["camera"]["sensor"],
+            tiles=self._values["dispatcher"]["tiles"],
             extractors=len({name for (name, _), life in self._lives.items() if life.command == "extractor"}),
-            wall_s=self._wall_s(folder), ended="complete",
-            messages_undecodable=sum(status.num_undecodable for status in self._view.statuses.values()))
+            wall_s=self._wall_s(folder),
+            ended="complete",
+            messages_undecodable=sum(status.num_undecodable for status in self._view.statuses.values()),
+        )
 
     def _wall_s(self, folder: Path) -> float:
         """From the camera's start to the last pose; of a run that had all its poses before the script began, between its poses."""
@@ -94,5 +100,12 @@ class ScriptRun:
             max_rss_mb[name] = max(max_rss_mb.get(name, 0.0), life.max_rss_mb)
             if number > self._earlier[name] + 1:
                 restarts.append((name, life))
-        return ProcessFacts(cpu_s, max_rss_mb, sum(life.command == "extractor" for _, life in restarts),
-                            [f"{name} on {life.deputy} was started again: it {life.reason or 'was asked to'}" for name, life in restarts])
+        return ProcessFacts(
+            cpu_s,
+            max_rss_mb,
+            sum(life.command == "extractor" for _, life in restarts),
+            [
+                f"{name} on {life.deputy} was started again: it {life.reason or 'was asked to'}"
+                for name, life in restarts
+            ],
+        )

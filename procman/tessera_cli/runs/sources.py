@@ -29,8 +29,10 @@ class Source:
 def parse_source(text: str) -> Source:
     kind, colon, rest = text.partition(":")
     if not colon:
-        raise UserError(f"source '{text}' has no kind: write kitti:DIR, euroc:DIR, tum:DIR, video:FILE, log:FILE, ...; "
-                        "procman/tessera run --help lists all.")
+        raise UserError(
+            f"source '{text}' has no kind: write kitti:DIR, euroc:DIR, tum:DIR, video:FILE, log:FILE, ...; "
+            "procman/tessera run --help lists all."
+        )
     if kind in FOLDERS or kind in FILES:
         return _stored_source(kind, rest)
     if kind == "camera":
@@ -45,8 +47,10 @@ def parse_source(text: str) -> Source:
         if rest and not rest.startswith("udpm://"):
             raise UserError(f"source '{text}': write bus: or bus:udpm://GROUP:PORT?ttl=0.")
         return Source(kind, rest, "bus")
-    raise UserError(f"source '{text}' is of no known kind: write kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, "
-                    "rtsp://..., sim:NAME, log:FILE or bus:.")
+    raise UserError(
+        f"source '{text}' is of no known kind: write kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, "
+        "rtsp://..., sim:NAME, log:FILE or bus:."
+    )
 
 
 def _stored_source(kind: str, rest: str) -> Source:
@@ -63,5 +67,8 @@ def _stored_source(kind: str, rest: str) -> Source:
 
 def _simulated_source(rest: str) -> Source:
     """The camera process checks the options; here only the path of a drive is made absolute."""
-    options = [f"path={Path(option[5:]).expanduser().resolve()}" if option.startswith("path=") else option for option in rest.split(",")]
+    options = [
+        f"path={Path(option[5:]).expanduser().resolve()}" if option.startswith("path=") else option
+        for option in rest.split(",")
+    ]
     return Source("sim", "sim:" + ",".join(options), f"sim-{options[0]}")

@@ -4,18 +4,36 @@ import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tessera_cli.report import trajectory_plot as plot
 from tessera_cli.errors import RunFailed
 from tessera_cli.files import write_text
-from tessera_cli.supervision.private_deputy import PrivateDeputy
+from tessera_cli.report import trajectory_plot as plot
 from tessera_cli.report.html_report import write_report
 from tessera_cli.runs.run_folder import Result, default_alignment, read_run
+from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.versions import collect_versions
 
 # What the evaluator's run.json hands over as it is.
-EVALUATOR_KEYS = ("frames", "frames_tracked", "frames_lost", "frames_initializing", "frames_dropped", "tracking_failures",
-                  "relocalizations", "keyframes", "landmarks", "loops_closed", "stage_values", "pose_time_ms", "latency_ms", "map_wait_ms", "stage_ms", "messages_repaired", "messages_lost",
-                  "trajectory_sha256", "map_sha256")
+EVALUATOR_KEYS = (
+    "frames",
+    "frames_tracked",
+    "frames_lost",
+    "frames_initializing",
+    "frames_dropped",
+    "tracking_failures",
+    "relocalizations",
+    "keyframes",
+    "landmarks",
+    "loops_closed",
+    "stage_values",
+    "pose_time_ms",
+    "latency_ms",
+    "map_wait_ms",
+    "stage_ms",
+    "messages_repaired",
+    "messages_lost",
+    "trajectory_sha256",
+    "map_sha256",
+)
 
 
 @dataclass(frozen=True)
@@ -43,18 +61,29 @@ class ProcessFacts:
 
 def summarize(folder: Path, facts: RunFacts, deputy: PrivateDeputy) -> dict:
     """As write_summary, of a run of this machine."""
-    return write_summary(folder, facts, ProcessFacts(
-        cpu_s={process.name: process.cpu_s for process in deputy.processes},
-        max_rss_mb={process.name: process.max_rss_mb for process in deputy.processes},
-        num_extractor_restarts=deputy.num_restarts("extractor"), warnings=deputy.warnings))
+    return write_summary(
+        folder,
+        facts,
+        ProcessFacts(
+            cpu_s={process.name: process.cpu_s for process in deputy.processes},
+            max_rss_mb={process.name: process.max_rss_mb for process in deputy.processes},
+            num_extractor_restarts=deputy.num_restarts("extractor"),
+            warnings=deputy.warnings,
+        ),
+    )
 
 
 def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> dict:
     """Writes summary.json, trajectory.png and report.html, and returns the summary. Raises RunFailed if the evaluator wrote nothing."""
     evaluated = _read_evaluation(folder)
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
-    summary = {"source": facts.source, "sensor": facts.sensor, "extractors": facts.extractors, "tiles": facts.tiles,
-               "ended": facts.ended}
+    summary = {
+        "source": facts.source,
+        "sensor": facts.sensor,
+        "extractors": facts.extractors,
+        "tiles": facts.tiles,
+        "ended": facts.ended,
+    }
     summary.update({key: evaluated.get(key) for key in EVALUATOR_KEYS})
     summary.update(
         rms_error_m=result.error.rms_m if result.error else None,
@@ -79,20 +108,28 @@ def _read_evaluation(folder: Path) -> dict:
     try:
         return json.loads((folder / "run.json").read_text())
     except (OSError, ValueError) as error:
-        raise RunFailed(f"the evaluator left no results in {folder}; {folder / 'stages' / 'evaluator.log'} may say why.") from error
+        raise RunFailed(
+            f"the evaluator left no results in {folder}; {folder / 'stages' / 'evaluator.log'} may say why."
+        ) from error
 
 
 def _in_words(result: Result) -> str:
     """The alignment, or why there is none."""
     error = result.error
-    return f"{error.alignment} over {len(error.errors_m)} frames, scale {error.scale:.6g}" if error else f"none: {result.error_note}"
+    return (
+        f"{error.alignment} over {len(error.errors_m)} frames, scale {error.scale:.6g}"
+        if error
+        else f"none: {result.error_note}"
+    )
 
 
 def _plot(folder: Path, result: Result) -> None:
     summary = result.summary
     kind, _, place = summary["source"].partition(":")
-    title = (f"{kind}:{place.rstrip('/').rpartition('/')[2]}, {summary['sensor']}: "
-             f"{summary['frames_tracked']} of {summary['frames']} frames tracked")
+    title = (
+        f"{kind}:{place.rstrip('/').rpartition('/')[2]}, {summary['sensor']}: "
+        f"{summary['frames_tracked']} of {summary['frames']} frames tracked"
+    )
     if result.error:
         plot.plot_error(result, title, folder / "trajectory.png")
     elif result.estimate:
@@ -105,9 +142,12 @@ def _loops_in_words(summary: dict) -> str:
     if not counts.get("loop_candidates"):
         return ""
     alike, consistent, matched, aligned, confirmed = (
-        int(counts.get(f"loop_{name}", 0)) for name in ("candidates", "consistent", "matched", "aligned", "confirmed"))
-    return (f"loop candidates: {alike} places looked alike, {consistent} also from the keyframes before, {matched} shared enough landmarks, "
-            f"{aligned} agreed on where the camera stood, {confirmed} were confirmed")
+        int(counts.get(f"loop_{name}", 0)) for name in ("candidates", "consistent", "matched", "aligned", "confirmed")
+    )
+    return (
+        f"loop candidates: {alike} places looked alike, {consistent} also from the keyframes before, {matched} shared enough landmarks, "
+        f"{aligned} agreed on where the camera stood, {confirmed} were confirmed"
+    )
 
 
 def in_words(summary: dict, folder: Path) -> str:
@@ -125,11 +165,17 @@ def in_words(summary: dict, folder: Path) -> str:
         lines.append(f"RMS error {summary['rms_error_m']:.3f} m after alignment by {summary['alignment']}")
     else:
         lines.append(f"error: {summary['alignment']}")
-    lines.append(f"{_statistics('pose time', summary['pose_time_ms'])}; {_statistics('latency', summary['latency_ms'])}")
+    lines.append(
+        f"{_statistics('pose time', summary['pose_time_ms'])}; {_statistics('latency', summary['latency_ms'])}"
+    )
     if wait := summary["map_wait_ms"]:
-        lines.append(f"the tracker waited for the mapper {wait['mean']:.1f} ms a frame, 95 % {wait['p95']:.1f} ms, longest {wait['max']:.0f} ms")
-    lines.append(f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
-                 f"{summary['messages_undecodable']} undecodable; extractors started again: {summary['extractor_restarts']}")
+        lines.append(
+            f"the tracker waited for the mapper {wait['mean']:.1f} ms a frame, 95 % {wait['p95']:.1f} ms, longest {wait['max']:.0f} ms"
+        )
+    lines.append(
+        f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
+        f"{summary['messages_undecodable']} undecodable; extractors started again: {summary['extractor_restarts']}"
+    )
     lines += [f"warning: {warning}" for warning in summary["warnings"]]
     lines.append(f"report: {folder / 'report.html'}")
     return "\n".join(lines)

@@ -43,7 +43,7 @@ class TrajectoryError:
         return float(np.sqrt(np.mean(self.errors_m**2)))
 
     def align(self, positions: np.ndarray) -> np.ndarray:
-        """n x 3 of the estimate's world in the truth's: scale * rotation * p + translation."""
+        """N x 3 of the estimate's world in the truth's: scale * rotation * p + translation."""
         return self.scale * positions @ self.rotation.T + self.translation
 
 
@@ -97,9 +97,13 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
     if estimate.has_times != truth.has_times:
         raise UserError("one trajectory has timestamps and the other has none: give two TUM files or two KITTI files.")
     if not estimate.has_times and len(estimate.positions) != len(truth.positions):
-        raise UserError(f"KITTI files go together by row, but one has {len(estimate.positions)} rows and the other {len(truth.positions)}.")
+        raise UserError(
+            f"KITTI files go together by row, but one has {len(estimate.positions)} rows and the other {len(truth.positions)}."
+        )
     try:
-        true_path, estimated_path = sync.associate_trajectories(_to_evo(truth), _to_evo(estimate), max_diff=MAX_TIME_DIFFERENCE_S)
+        true_path, estimated_path = sync.associate_trajectories(
+            _to_evo(truth), _to_evo(estimate), max_diff=MAX_TIME_DIFFERENCE_S
+        )
     except sync.SyncException as error:
         raise UserError("no two poses of the trajectories have the same time.") from error
     if true_path.num_poses < MIN_POSES:
@@ -110,9 +114,17 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
         raise UserError("the poses don't determine an alignment: the camera stood still or moved on a line.") from error
     error = metrics.APE(metrics.PoseRelation.translation_part)
     error.process_data((true_path, estimated_path))
-    return TrajectoryError(np.asarray(true_path.timestamps), estimated_path.positions_xyz, true_path.positions_xyz,
-                           np.asarray(error.error), float(scale), "Sim(3)" if with_scale else "SE(3)",
-                           rotation, translation, len(estimate.positions))
+    return TrajectoryError(
+        np.asarray(true_path.timestamps),
+        estimated_path.positions_xyz,
+        true_path.positions_xyz,
+        np.asarray(error.error),
+        float(scale),
+        "Sim(3)" if with_scale else "SE(3)",
+        rotation,
+        translation,
+        len(estimate.positions),
+    )
 
 
 def length_m(positions: np.ndarray) -> float:
@@ -123,5 +135,8 @@ def length_m(positions: np.ndarray) -> float:
 def _to_evo(trajectory: Trajectory):
     from evo.core.trajectory import PoseTrajectory3D
 
-    return PoseTrajectory3D(positions_xyz=trajectory.positions.copy(), timestamps=trajectory.timestamps_s,
-                            orientations_quat_wxyz=np.roll(trajectory.quaternions_xyzw, 1, axis=1))
+    return PoseTrajectory3D(
+        positions_xyz=trajectory.positions.copy(),
+        timestamps=trajectory.timestamps_s,
+        orientations_quat_wxyz=np.roll(trajectory.quaternions_xyzw, 1, axis=1),
+    )

@@ -7,19 +7,21 @@ from pathlib import Path
 
 from tessera_cli import settings
 from tessera_cli.errors import UserError
-from tessera_cli.supervision.sheriff_commands import say
-from tessera_cli.supervision.process_names import LIST
-from tessera_cli.supervision.process_list import ProcessList, read_process_list
 from tessera_cli.lcm_bus import ttl_of
-from tessera_cli.supervision.script_runner import ScriptRunner
 from tessera_cli.runs.script_summary import ScriptRun
+from tessera_cli.supervision.process_list import ProcessList, read_process_list
+from tessera_cli.supervision.process_names import LIST
+from tessera_cli.supervision.script_runner import ScriptRunner
 from tessera_cli.supervision.sheriff import Sheriff
+from tessera_cli.supervision.sheriff_commands import say
 
 
 def main(arguments: Namespace) -> int:
     process_list = read_process_list(Path(arguments.file), dict(arguments.counts))
     if arguments.script and arguments.script not in process_list.scripts:
-        raise UserError(f"{arguments.file} has no script '{arguments.script}'; it has: {', '.join(process_list.scripts) or 'none'}.")
+        raise UserError(
+            f"{arguments.file} has no script '{arguments.script}'; it has: {', '.join(process_list.scripts) or 'none'}."
+        )
     name = _name(arguments)
     assignments = _assignments(process_list, arguments)
     values = _check(assignments)
@@ -47,7 +49,9 @@ def main(arguments: Namespace) -> int:
 def _name(arguments: Namespace) -> str:
     name = arguments.name or Path(arguments.file).stem
     if not LIST.fullmatch(name):
-        raise UserError(f"'{name}' can't be a list's name, which has letters, digits, _ . and -, at most 48: give --name NAME.")
+        raise UserError(
+            f"'{name}' can't be a list's name, which has letters, digits, _ . and -, at most 48: give --name NAME."
+        )
     return name
 
 
@@ -74,5 +78,7 @@ def _refuse_clash(sheriff: Sheriff, name: str, process_list: ProcessList, bus: d
             if each.name == name or (each.main_url, each.channel_prefix) != (bus["main_url"], bus["channel_prefix"]):
                 continue
             if common := [process.name for process in each.processes if process.pid and process.name in stages]:
-                raise UserError(f"the list {each.name} has a '{common[0]}' on the same bus: end it (procman/tessera down {each.name}), or give "
-                                f"this one channels of its own: --set bus.channel_prefix={name.upper()}_")
+                raise UserError(
+                    f"the list {each.name} has a '{common[0]}' on the same bus: end it (procman/tessera down {each.name}), or give "
+                    f"this one channels of its own: --set bus.channel_prefix={name.upper()}_"
+                )

@@ -10,27 +10,43 @@ from tessera_cli.supervision.pmd_syntax import Attribute, Block
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,47}")
 HOST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 MAX_INSTANCES = 256  # extractors that a dispatcher takes
-RESPAWN = {"always": "always", "failure": "failure", "killed": "killed", "never": "never", "true": "always", "false": "never"}
+RESPAWN = {
+    "always": "always",
+    "failure": "failure",
+    "killed": "killed",
+    "never": "never",
+    "true": "always",
+    "false": "never",
+}
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """How a process runs. All values are checked where they are read."""
 
-    ready: str = "status"            # ready when its stage status says RUNNING; "started": when it exists for a moment
-    ready_timeout_s: float = 30.0    # one that is not ready by then is ended and counts as died; LCM's self-test alone takes up to 10 s
-    hang_timeout_s: float = 15.0     # a ready one without a stage status for so long hangs and is killed; 0: never. They come at 2 Hz
-    auto_respawn: str = "failure"    # started again: always, after failure (not status 0 or 2), only when killed by a signal, never
-    nice: int = 0                    # added to the deputy's own
-    cpus: tuple[int, ...] = ()       # that it may run on; empty: all
-    memory_limit_mb: float = 0.0     # 10^6 bytes of the whole tree; above, it is killed; 0: no limit
+    ready: str = "status"  # ready when its stage status says RUNNING; "started": when it exists for a moment
+    ready_timeout_s: float = (
+        30.0  # one that is not ready by then is ended and counts as died; LCM's self-test alone takes up to 10 s
+    )
+    hang_timeout_s: float = (
+        15.0  # a ready one without a stage status for so long hangs and is killed; 0: never. They come at 2 Hz
+    )
+    auto_respawn: str = (
+        "failure"  # started again: always, after failure (not status 0 or 2), only when killed by a signal, never
+    )
+    nice: int = 0  # added to the deputy's own
+    cpus: tuple[int, ...] = ()  # that it may run on; empty: all
+    memory_limit_mb: float = 0.0  # 10^6 bytes of the whole tree; above, it is killed; 0: no limit
     stop_signal: int = signal.SIGTERM
-    stop_time_allowed: float = 5.0   # s from that signal to SIGKILL
+    stop_time_allowed: float = 5.0  # s from that signal to SIGKILL
 
 
 def number(minimum: float, maximum: float, kind: type = float) -> Callable[[str], float]:
     def parse(text: str):
-        if not re.fullmatch(r"-?\d{1,9}(\.\d{1,6})?" if kind is float else r"-?\d{1,9}", text) or not minimum <= float(text) <= maximum:
+        if (
+            not re.fullmatch(r"-?\d{1,9}(\.\d{1,6})?" if kind is float else r"-?\d{1,9}", text)
+            or not minimum <= float(text) <= maximum
+        ):
             raise ValueError(f"must be a {'whole ' if kind is int else ''}number from {minimum} to {maximum}")
         return kind(text)
 
@@ -104,7 +120,7 @@ def read_attribute(attribute: Attribute, readers: dict[str, Callable]):
     try:
         return readers[attribute.name](attribute.value)
     except ValueError as error:
-        raise attribute.place.error(f"{attribute.name} = \"{attribute.value}\": it {error}.") from error
+        raise attribute.place.error(f'{attribute.name} = "{attribute.value}": it {error}.') from error
 
 
 def read_attributes(block: Block, readers: dict[str, Callable]) -> dict:

@@ -26,7 +26,7 @@ class Launch:
     command: str
     depends: tuple[str, ...]
     options: RunOptions
-    run: str        # digest of the settings
+    run: str  # digest of the settings
     generation: int  # another one, another process
 
 
@@ -52,18 +52,25 @@ def _prepare(parent: int, options: RunOptions) -> None:
 
 
 class Child:
-    def __init__(self, launch: Launch, mark: str):
+    def __init__(self, launch: Launch, mark: str) -> None:
         """Raises OSError or subprocess.SubprocessError (a nice value or CPU that the kernel refuses)."""
         parent = os.getpid()
         self._mark = mark
         self._popen = subprocess.Popen(
-            launch.words, cwd=launch.folder, env={**os.environ, **dict(launch.environment), MARK: mark}, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=lambda: _prepare(parent, launch.options))
+            launch.words,
+            cwd=launch.folder,
+            env={**os.environ, **dict(launch.environment), MARK: mark},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=lambda: _prepare(parent, launch.options),
+        )
         os.set_blocking(self._popen.stdout.fileno(), False)
         self.pid = self._popen.pid
         self.may_say_more = True  # until it and all its descendants have closed their output
-        self.cpu_s = 0.0          # of itself and of descendants that it waited for; known when it has ended
-        self.max_rss_mb = 0.0     # its own peak, 10^6 bytes
+        self.cpu_s = 0.0  # of itself and of descendants that it waited for; known when it has ended
+        self.max_rss_mb = 0.0  # its own peak, 10^6 bytes
         self._status: int | None = None
 
     def fileno(self) -> int:

@@ -13,8 +13,8 @@ from pathlib import Path
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT
 from tessera_cli.supervision.attributes import read_attributes
-from tessera_cli.supervision.process_list import require_name
 from tessera_cli.supervision.pmd_syntax import Block, read_blocks
+from tessera_cli.supervision.process_list import require_name
 
 PLACEHOLDER = re.compile(r"\$\{([^}]*)\}")
 PLACEHOLDERS = ("bin", "settings", "name", "id")
@@ -24,7 +24,7 @@ PLACEHOLDERS = ("bin", "settings", "name", "id")
 class LocalCommand:
     name: str
     words: tuple[str, ...]  # program and arguments, with placeholders
-    folder: Path            # working folder
+    folder: Path  # working folder
     environment: dict[str, str] = field(default_factory=dict)  # added to the deputy's own
 
     def fill(self, values: dict[str, str]) -> list[str]:
@@ -38,10 +38,10 @@ def read_command_list(path: Path, folder: Path = ROOT) -> dict[str, LocalCommand
     for block in read_blocks(path):
         command = _read_command(block, folder)
         if command.name in commands:
-            raise block.place.error(f"there are two commands \"{command.name}\".")
+            raise block.place.error(f'there are two commands "{command.name}".')
         commands[command.name] = command
     if not commands:
-        raise UserError(f"{path} lists no command: it needs a block cmd \"NAME\" {{ exec = \"PROGRAM ARGUMENTS\"; }}.")
+        raise UserError(f'{path} lists no command: it needs a block cmd "NAME" {{ exec = "PROGRAM ARGUMENTS"; }}.')
     return commands
 
 
@@ -49,10 +49,10 @@ def _read_command(block: Block, folder: Path) -> LocalCommand:
     if block.kind != "cmd":
         raise block.place.error(f"a command list holds only cmd, not '{block.kind}'.")
     for inner in block.blocks + block.steps:
-        raise inner.place.error("a cmd holds only attributes such as exec = \"PROGRAM ARGUMENTS\";.")
+        raise inner.place.error('a cmd holds only attributes such as exec = "PROGRAM ARGUMENTS";.')
     values = read_attributes(block, {"exec": _read_words, "folder": _read_folder, "environment": _read_environment})
     if "exec" not in values:
-        raise block.place.error(f"cmd \"{block.name}\" has no exec.")
+        raise block.place.error(f'cmd "{block.name}" has no exec.')
     words = values.pop("exec")
     return LocalCommand(require_name(block), words, **{"folder": folder, **values})
 

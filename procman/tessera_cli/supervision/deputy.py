@@ -11,24 +11,24 @@ from argparse import Namespace
 from pathlib import Path
 
 from tessera_cli import settings
+from tessera_cli.cluster.keys import KeyRing, key_folder
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BIN, ROOT
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.lcm_bus import ORDER, STATUS, Bus, procman_url
+from tessera_cli.messages import procman_order_t, procman_status_t, stage_status_t
 from tessera_cli.supervision.attributes import HOST
 from tessera_cli.supervision.command_list import read_command_list
-from tessera_cli.supervision.supervisor import Crew
+from tessera_cli.supervision.deputy_status import make_status
 from tessera_cli.supervision.guard import Guard
-from tessera_cli.cluster.keys import KeyRing, key_folder
-from tessera_cli.supervision.process_names import LIST, qualify, split
 from tessera_cli.supervision.orders import Gate
 from tessera_cli.supervision.output_forwarder import OutputForwarder
-from tessera_cli.lcm_bus import ORDER, STATUS, Bus, procman_url
-from tessera_cli.supervision.deputy_status import make_status
+from tessera_cli.supervision.process_names import LIST, qualify, split
+from tessera_cli.supervision.progress import FINISHED
 from tessera_cli.supervision.running_list import RunningList, listen_to
 from tessera_cli.supervision.state_folder import StateFolder
+from tessera_cli.supervision.supervisor import Crew
 from tessera_cli.supervision.wishes import run_of, to_launch
-from tessera_cli.supervision.progress import FINISHED
-from tessera_cli.messages import procman_order_t, procman_status_t, stage_status_t
 
 STATUS_PERIOD_S = 1.0
 TURN_S = 0.05
@@ -40,13 +40,22 @@ def main(arguments: Namespace) -> int:
     deputy_id = arguments.id or os.uname().nodename
     if not HOST.fullmatch(deputy_id):
         raise UserError(f"the id '{deputy_id}' must have letters, digits, _ . and - only.")
-    path = Path(arguments.folder).expanduser().absolute() if arguments.folder else ROOT / "logs" / "deputies" / f"{deputy_id}-{arguments.port}"
-    return Deputy(deputy_id, StateFolder(path, deputy_id), Path(arguments.commands).expanduser().absolute(), procman_url(arguments),
-                  not arguments.fresh).run()
+    path = (
+        Path(arguments.folder).expanduser().absolute()
+        if arguments.folder
+        else ROOT / "logs" / "deputies" / f"{deputy_id}-{arguments.port}"
+    )
+    return Deputy(
+        deputy_id,
+        StateFolder(path, deputy_id),
+        Path(arguments.commands).expanduser().absolute(),
+        procman_url(arguments),
+        not arguments.fresh,
+    ).run()
 
 
 class Deputy:
-    def __init__(self, deputy_id: str, folder: StateFolder, commands_path: Path, url: str, resumes: bool):
+    def __init__(self, deputy_id: str, folder: StateFolder, commands_path: Path, url: str, resumes: bool) -> None:
         self._id, self._folder, self._resumes = deputy_id, folder, resumes
         self._commands = read_command_list(commands_path)
         self._ring = KeyRing(key_folder())
@@ -100,7 +109,9 @@ class Deputy:
             self._wait(TURN_S, [self._bus])
             self._bus.handle_waiting()
         if self._twin:
-            raise UserError(f"a deputy with the id {self._id} runs on {self._twin} already: give one of them another --id NAME.")
+            raise UserError(
+                f"a deputy with the id {self._id} runs on {self._twin} already: give one of them another --id NAME."
+            )
 
     def _turn(self) -> None:
         buses = [self._bus, *(each.bus for each in self._lists.values())]
@@ -129,10 +140,14 @@ class Deputy:
             return
         for each in status.lists:
             if each.name in self._lists and each.run == self._lists[each.name].run:
-                self._crew.hear_of_others({qualify(each.name, process.name): process.state for process in each.processes}, time.monotonic())
+                self._crew.hear_of_others(
+                    {qualify(each.name, process.name): process.state for process in each.processes}, time.monotonic()
+                )
 
     def _on_stage(self, list_name: str, status: stage_status_t) -> None:
-        self._crew.on_stage_status(qualify(list_name, status.name), status.pid, status.state == FINISHED, time.monotonic())
+        self._crew.on_stage_status(
+            qualify(list_name, status.name), status.pid, status.state == FINISHED, time.monotonic()
+        )
 
     def _on_order(self, data: bytes) -> None:
         order = self.gate.check(data)
@@ -166,7 +181,9 @@ class Deputy:
         if order.action == procman_order_t.RUN:
             self._obey_run(order)
         elif order.process not in self._crew.names:
-            raise UserError(f"the deputy {self._id} has no process '{order.process}'; it has: {', '.join(self._crew.names) or 'none'}.")
+            raise UserError(
+                f"the deputy {self._id} has no process '{order.process}'; it has: {', '.join(self._crew.names) or 'none'}."
+            )
         elif order.action == procman_order_t.RESTART:
             self._num_restarts += 1
             self._crew.restart(order.process, self._num_restarts)
@@ -213,12 +230,16 @@ class Deputy:
     def _forget_ended(self, ordered: str) -> None:
         """Other lists of which nothing is left but what was shown as stopped."""
         for name in list(self._lists):
-            if name != ordered and all(member.is_idle for member in self._crew.processes if split(member.name)[0] == name):
+            if name != ordered and all(
+                member.is_idle for member in self._crew.processes if split(member.name)[0] == name
+            ):
                 self._crew.want({}, "", qualify(name, ""))
                 del self._lists[name]
 
     def _publish_status(self) -> None:
         self._status_at = time.monotonic()
-        status = make_status(self._bus.header(STATUS), self.gate, self._lists.values(), self._crew.processes, self._status_at)
+        status = make_status(
+            self._bus.header(STATUS), self.gate, self._lists.values(), self._crew.processes, self._status_at
+        )
         status.last_order, status.last_refusal = self._last_order, self._last_refusal
         self._bus.publish(STATUS, status.encode())

@@ -5,21 +5,27 @@ from collections.abc import Iterable
 
 import psutil
 
-from tessera_cli.supervision.process_names import split
+from tessera_cli.messages import header_t, procman_list_t, procman_process_t, procman_status_t
 from tessera_cli.supervision.orders import Gate
+from tessera_cli.supervision.process_names import split
 from tessera_cli.supervision.running_list import RunningList
 from tessera_cli.supervision.supervised_process import Supervised
-from tessera_cli.messages import header_t, procman_list_t, procman_process_t, procman_status_t
 
 MAX_REASON = 300
 
 
-def make_status(header: header_t, gate: Gate, lists: Iterable[RunningList], members: list[Supervised], now: float) -> procman_status_t:
+def make_status(
+    header: header_t, gate: Gate, lists: Iterable[RunningList], members: list[Supervised], now: float
+) -> procman_status_t:
     """All but what depends on the last order. `now`: monotonic seconds."""
     status = procman_status_t()
     status.header = header
     status.deputy, status.host, status.nonce = gate.deputy, os.uname().nodename, gate.nonce
-    status.last_number, status.num_obeyed, status.num_for_others = gate.last_number, gate.num_passed, gate.num_for_others
+    status.last_number, status.num_obeyed, status.num_for_others = (
+        gate.last_number,
+        gate.num_passed,
+        gate.num_for_others,
+    )
     status.kinds = sorted(gate.refused)
     status.num_kinds = len(status.kinds)
     status.num_refused = [gate.refused[kind] for kind in status.kinds]
@@ -40,7 +46,11 @@ def _describe_list(running: RunningList, members: list[Supervised], now: float) 
 
 def _describe(member: Supervised, now: float) -> procman_process_t:
     process = procman_process_t()
-    process.name, process.state, process.reason = split(member.name)[1], member.state, member.reason[:MAX_REASON].replace("\0", "")
+    process.name, process.state, process.reason = (
+        split(member.name)[1],
+        member.state,
+        member.reason[:MAX_REASON].replace("\0", ""),
+    )
     process.command = member.wanted.command if member.wanted else ""
     process.num_starts = member.num_starts
     if member.child:

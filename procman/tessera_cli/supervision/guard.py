@@ -17,7 +17,7 @@ from tessera_cli.supervision.process_tree import kill_marked
 class Guard:
     """The deputy's side."""
 
-    def __init__(self, mark: str):
+    def __init__(self, mark: str) -> None:
         """`mark`: what the marks of all its processes begin with. Those of an earlier deputy are ended now."""
         if not kill_marked(mark):
             raise RunFailed("processes of an earlier deputy of this folder can't be ended.")
@@ -25,8 +25,12 @@ class Guard:
         self._process = self._start()
 
     def _start(self) -> subprocess.Popen:
-        return subprocess.Popen([sys.executable, "-m", "tessera_cli.supervision.guard", self._mark], stdin=subprocess.PIPE,
-                                start_new_session=True, env={**os.environ, "PYTHONPATH": str(ROOT / "procman")})
+        return subprocess.Popen(
+            [sys.executable, "-m", "tessera_cli.supervision.guard", self._mark],
+            stdin=subprocess.PIPE,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT / "procman")},
+        )
 
     def watch(self) -> None:
         """Starts another guard if somebody has ended this one."""

@@ -1,15 +1,15 @@
 """What the stages of one list say on their own bus, whichever node they are on."""
 
 from tessera_cli.lcm_bus import Bus
+from tessera_cli.messages import pose_t, stage_status_t
 from tessera_cli.runs.live_view import describe_time
 from tessera_cli.supervision.progress import Progress
-from tessera_cli.messages import pose_t, stage_status_t
 
 TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
 
 
 class ListView:
-    def __init__(self, main_url: str, channel_prefix: str):
+    def __init__(self, main_url: str, channel_prefix: str) -> None:
         self.bus = Bus(main_url, "watch")
         self.bus.subscribe(channel_prefix + "STATUS", stage_status_t, self._on_stage)
         self.bus.subscribe(channel_prefix + "POSE", pose_t, self._on_pose)
@@ -36,5 +36,7 @@ class ListView:
         if progress.num_poses == 0:
             return ""
         of_all = f" of {progress.num_frames}" if progress.num_frames else ""
-        return (f"frame {progress.last_frame + 1}{of_all}, {progress.frames_per_s:.1f}/s, {describe_time(progress.time_left_s)} left, "
-                f"{progress.tracking_state}")
+        return (
+            f"frame {progress.last_frame + 1}{of_all}, {progress.frames_per_s:.1f}/s, {describe_time(progress.time_left_s)} left, "
+            f"{progress.tracking_state}"
+        )

@@ -10,7 +10,7 @@ NUM_OLD = 3
 class RotatingLog:
     """`path` is the newest; path.1, path.2, ... are older. Appends to what an earlier deputy wrote."""
 
-    def __init__(self, path: Path, max_bytes: int = MAX_BYTES, num_old: int = NUM_OLD):
+    def __init__(self, path: Path, max_bytes: int = MAX_BYTES, num_old: int = NUM_OLD) -> None:
         self.path = path
         self._max_bytes, self._num_old = max_bytes, num_old
         path.parent.mkdir(parents=True, exist_ok=True)  # that of its list

@@ -14,13 +14,13 @@ TAIL_BYTES = 1000
 
 @dataclass
 class _Pending:
-    rest: bytes = b""   # an unfinished line
+    rest: bytes = b""  # an unfinished line
     text: bytes = b""
     num_omitted: int = 0
 
 
 class OutputForwarder:
-    def __init__(self, bus: Bus, deputy: str):
+    def __init__(self, bus: Bus, deputy: str) -> None:
         self._bus, self._deputy = bus, deputy
         self._pending: dict[str, _Pending] = {}
         self._due_at = 0.0
@@ -49,7 +49,7 @@ class OutputForwarder:
     def send_tail(self, process: str, order: str, text: str) -> None:
         """In pieces; an empty one says that it was the last."""
         for start in range(0, len(text), TAIL_BYTES):
-            self._send(process, order, text[start:start + TAIL_BYTES], 0)
+            self._send(process, order, text[start : start + TAIL_BYTES], 0)
         self._send(process, order, "", 0)
 
     def _send(self, process: str, order: str, text: str, num_omitted: int) -> None:

@@ -17,10 +17,13 @@ from tessera_cli.errors import UserError
 # A process list of a hundred nodes is some tens of kilobytes; more is not a process list.
 MAX_FILE_BYTES = 1_000_000
 MAX_DEPTH = 20
-TOKEN = re.compile(r"""(?P<blank>[ \t\r\n]+|\#[^\n]*)
+TOKEN = re.compile(
+    r"""(?P<blank>[ \t\r\n]+|\#[^\n]*)
                      |(?P<string>"(?:[^"\\\n]|\\["\\])*")
                      |(?P<word>[A-Za-z0-9_.:/+-]+)
-                     |(?P<mark>[{}=;])""", re.VERBOSE)
+                     |(?P<mark>[{}=;])""",
+    re.VERBOSE,
+)
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,11 @@ def _tokens(text: str, path: Path) -> list[Token]:
         place = Place(path, line, position - line_start + 1)
         match = TOKEN.match(text, position)
         if not match:
-            what = "this string does not end on its line" if text[position] == '"' else f"'{text[position]}' means nothing here"
+            what = (
+                "this string does not end on its line"
+                if text[position] == '"'
+                else f"'{text[position]}' means nothing here"
+            )
             raise place.error(f"{what}.")
         if match.lastgroup == "string":
             tokens.append(Token("string", re.sub(r'\\(["\\])', r"\1", match[0][1:-1]), place))
@@ -102,7 +109,7 @@ def _tokens(text: str, path: Path) -> list[Token]:
 
 
 class _Parser:
-    def __init__(self, tokens: list[Token]):
+    def __init__(self, tokens: list[Token]) -> None:
         self._tokens = tokens
         self._next = 0
 

@@ -11,16 +11,16 @@ from pathlib import Path
 
 from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.files import BIN, ROOT
+from tessera_cli.messages import procman_process_t as states
 from tessera_cli.supervision.attributes import RunOptions
 from tessera_cli.supervision.command_list import LocalCommand, read_command_list
-from tessera_cli.supervision.supervisor import Crew
 from tessera_cli.supervision.guard import Guard
 from tessera_cli.supervision.process_list import Process
+from tessera_cli.supervision.progress import FINISHED, RUNNING, StageReport
 from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.supervision.supervised_process import READY, Supervised
+from tessera_cli.supervision.supervisor import Crew
 from tessera_cli.supervision.wishes import to_launch, to_wish
-from tessera_cli.supervision.progress import FINISHED, RUNNING, StageReport
-from tessera_cli.messages import procman_process_t as states
 
 COMMANDS = ROOT / "procman" / "commands.pmd"
 END_TURN_S = 0.01
@@ -32,11 +32,19 @@ OWN_NAME = re.compile(r"^tessera-[a-z-]+: ")
 
 def helper(name: str, command: str, stop_time_allowed: float) -> Process:
     """A single process that ends by itself when its work is done."""
-    return Process(name, command, "", 0, (), RunOptions(ready="started", auto_respawn="never", stop_time_allowed=stop_time_allowed))
+    return Process(
+        name, command, "", 0, (), RunOptions(ready="started", auto_respawn="never", stop_time_allowed=stop_time_allowed)
+    )
 
 
 class PrivateDeputy:
-    def __init__(self, folder: LogFolder, settings_path: Path, processes: Iterable[Process], commands: dict[str, LocalCommand] | None = None):
+    def __init__(
+        self,
+        folder: LogFolder,
+        settings_path: Path,
+        processes: Iterable[Process],
+        commands: dict[str, LocalCommand] | None = None,
+    ) -> None:
         """`commands`: what their names stand for; else those of the shipped list, in the caller's working folder."""
         commands = commands or read_command_list(COMMANDS, Path.cwd())
         values = {"bin": str(BIN), "settings": str(settings_path)}
@@ -45,7 +53,7 @@ class PrivateDeputy:
         self._guard = Guard(folder.mark())
         self._crew = Crew(folder, lambda _name, _output: None)
         self._members: dict[str, Supervised] = {}  # also those that the crew has forgotten
-        self._pids: set[int] = set()               # of all lives
+        self._pids: set[int] = set()  # of all lives
         self._num_deaths_told: dict[str, int] = {}
         self.warnings: list[str] = []
 
@@ -74,7 +82,11 @@ class PrivateDeputy:
 
     def is_busy(self, names: Iterable[str]) -> bool:
         """Whether one of them uses processor time: a stage in a long step says nothing meanwhile."""
-        return any(member.child and member.usage.cpu_percent > BUSY_PERCENT for member in self.processes if member.name in names)
+        return any(
+            member.child and member.usage.cpu_percent > BUSY_PERCENT
+            for member in self.processes
+            if member.name in names
+        )
 
     def owns(self, pid: int) -> bool:
         return pid in self._pids
@@ -112,13 +124,19 @@ class PrivateDeputy:
 
     def end(self, names: Iterable[str] | None = None) -> None:
         """Returns when these (None: all) and what must end before them have ended; what does not listen in time is killed."""
-        chosen = {member.name for member in self.processes if not member.is_idle and (names is None or member.name in names)}
-        chosen |= {member.name for member in self.processes if member.state != states.FINISHED and chosen & set(member.depends)}
+        chosen = {
+            member.name for member in self.processes if not member.is_idle and (names is None or member.name in names)
+        }
+        chosen |= {
+            member.name for member in self.processes if member.state != states.FINISHED and chosen & set(member.depends)
+        }
         self.dismiss(chosen)
         while not all(self._members[name].is_idle for name in chosen):
             self._turn()
             time.sleep(END_TURN_S)
-        self.warnings += [f"{name} {self._members[name].reason}." for name in sorted(chosen) if self._members[name].reason]
+        self.warnings += [
+            f"{name} {self._members[name].reason}." for name in sorted(chosen) if self._members[name].reason
+        ]
 
     def require_success(self, name: str) -> None:
         """Raises what its exit status and last words say if it did not end well."""

@@ -9,7 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tessera_cli.errors import UserError
-from tessera_cli.supervision.attributes import ATTRIBUTES, MAX_INSTANCES, NAME, RunOptions, number, read_attribute, read_attributes
+from tessera_cli.supervision.attributes import (
+    ATTRIBUTES,
+    MAX_INSTANCES,
+    NAME,
+    RunOptions,
+    number,
+    read_attribute,
+    read_attributes,
+)
 from tessera_cli.supervision.pmd_syntax import Attribute, Block, Place, read_blocks
 
 SETTING = re.compile(r"[a-z_]+\.[a-z0-9_]+")
@@ -19,10 +27,10 @@ SETTING = re.compile(r"[a-z_]+\.[a-z0-9_]+")
 class Process:
     """One process on one host."""
 
-    name: str              # unique in the list and on the bus: the command's, with _<id> where there are several
-    command: str           # name in the deputy's command list
-    host: str              # id of the deputy; empty: that of this machine
-    instance: int          # 0, 1, ... among the processes of one cmd
+    name: str  # unique in the list and on the bus: the command's, with _<id> where there are several
+    command: str  # name in the deputy's command list
+    host: str  # id of the deputy; empty: that of this machine
+    instance: int  # 0, 1, ... among the processes of one cmd
     depends: tuple[str, ...]  # names of processes that must be ready before it starts
     options: RunOptions
 
@@ -53,7 +61,9 @@ class ProcessList:
 
 def require_name(block: Block) -> str:
     if not NAME.fullmatch(block.name):
-        raise block.place.error(f"{block.kind} needs a name in quotes, of letters, digits and _, at most 48; it has \"{block.name}\".")
+        raise block.place.error(
+            f'{block.kind} needs a name in quotes, of letters, digits and _, at most 48; it has "{block.name}".'
+        )
     return block.name
 
 
@@ -64,10 +74,10 @@ def read_process_list(path: Path, counts: dict[str, int] | None = None) -> Proce
 
 
 class _Reader:
-    def __init__(self, path: Path, counts: dict[str, int]):
+    def __init__(self, path: Path, counts: dict[str, int]) -> None:
         self._counts = counts
         self._list = ProcessList(path)
-        self._members: dict[str, list[str]] = {}       # processes of each cmd and group
+        self._members: dict[str, list[str]] = {}  # processes of each cmd and group
         self._depends: list[tuple[str, Attribute]] = []  # of a cmd, to be resolved when all names are known
 
     def read(self, blocks: list[Block]) -> ProcessList:
@@ -77,9 +87,9 @@ class _Reader:
             elif block.kind != "script":
                 self._read_member(block)
         if strangers := sorted(set(self._counts) - {block.name for block in _commands(blocks)}):
-            raise UserError(f"{self._list.path} has no cmd \"{strangers[0]}\".")
+            raise UserError(f'{self._list.path} has no cmd "{strangers[0]}".')
         if not self._list.processes:
-            raise UserError(f"{self._list.path} lists no process: it needs a block cmd \"NAME\" {{ ... }}.")
+            raise UserError(f'{self._list.path} lists no process: it needs a block cmd "NAME" {{ ... }}.')
         self._resolve_depends()
         for block in blocks:
             if block.kind == "script":
@@ -89,7 +99,7 @@ class _Reader:
 
     def _read_settings(self, block: Block) -> None:
         for inner in block.blocks + block.steps:
-            raise inner.place.error("settings holds only section.key = \"value\";.")
+            raise inner.place.error('settings holds only section.key = "value";.')
         for attribute in block.attributes:
             if not SETTING.fullmatch(attribute.name):
                 raise attribute.place.error(f"'{attribute.name}' is no setting; they are named section.key.")
@@ -101,7 +111,7 @@ class _Reader:
             raise block.place.error(f"there is no block '{block.kind}'; known: cmd, group, script, settings.")
         name = require_name(block)
         if name in self._members:
-            raise block.place.error(f"the name \"{name}\" is taken by an earlier block.")
+            raise block.place.error(f'the name "{name}" is taken by an earlier block.')
         for step in block.steps:
             raise step.place.error(f"'{step.words[0].text}' belongs into a script.")
         self._members[name] = []
@@ -131,7 +141,7 @@ class _Reader:
         for instance in range(len(hosts) * count):
             name = f"{block.name}_{instance}" if is_numbered else block.name
             if name in self._list.processes:
-                raise block.place.error(f"two processes would be named \"{name}\".")
+                raise block.place.error(f'two processes would be named "{name}".')
             process = Process(name, commands[0], hosts[instance // count], instance, (), RunOptions(**values))
             self._list.processes[name] = process
             names.append(name)
@@ -142,13 +152,15 @@ class _Reader:
             return self._members[name]
         if name in self._list.processes:
             return [name]
-        raise place.error(f"there is no cmd or group \"{name}\".")
+        raise place.error(f'there is no cmd or group "{name}".')
 
     def _resolve_depends(self) -> None:
         depends: dict[str, tuple[str, ...]] = {}
         places: dict[str, Place] = {}
         for command, attribute in self._depends:
-            found = [name for word in read_attribute(attribute, ATTRIBUTES) for name in self._names(word, attribute.place)]
+            found = [
+                name for word in read_attribute(attribute, ATTRIBUTES) for name in self._names(word, attribute.place)
+            ]
             for name in self._members[command]:
                 depends[name] = tuple(dict.fromkeys(found))
                 places[name] = attribute.place
@@ -157,14 +169,16 @@ class _Reader:
                 raise place.error(f"{' depends on '.join(circle)}: none of them could ever start.")
         for name, names in depends.items():
             process = self._list.processes[name]
-            self._list.processes[name] = Process(name, process.command, process.host, process.instance, names, process.options)
+            self._list.processes[name] = Process(
+                name, process.command, process.host, process.instance, names, process.options
+            )
 
     def _read_script(self, block: Block) -> None:
         name = require_name(block)
         if name in self._list.scripts:
-            raise block.place.error(f"there are two scripts \"{name}\".")
+            raise block.place.error(f'there are two scripts "{name}".')
         for inner in block.blocks + block.attributes:
-            raise inner.place.error("a script holds only steps such as start cmd \"NAME\";.")
+            raise inner.place.error('a script holds only steps such as start cmd "NAME";.')
         self._list.scripts[name] = [self._read_step(step.words, step.place) for step in block.steps]
 
     def _read_step(self, tokens, place: Place) -> ScriptStep:
@@ -176,15 +190,24 @@ class _Reader:
                 return ScriptStep("run_script", place, script=name)
             case ["wait", "ms", milliseconds]:
                 return ScriptStep("wait", place, seconds=_read_seconds(milliseconds, tokens[2].place) / 1000)
-            case ["wait", "cmd" | "group", name, "status", "ready" | "running" | "finished" | "stopped" as status, *rest]:
+            case [
+                "wait",
+                "cmd" | "group",
+                name,
+                "status",
+                "ready" | "running" | "finished" | "stopped" as status,
+                *rest,
+            ]:
                 # libbot's word for what exists is "running"; here a process that merely exists is of no use to anybody.
                 status = "ready" if status == "running" else status
                 if rest and (len(rest) != 2 or rest[0] != "timeout"):
                     raise tokens[5].place.error(f"'{rest[0]}' should be: timeout SECONDS;.")
                 seconds = _read_seconds(rest[1], tokens[6].place) if rest else 60.0
                 return ScriptStep("wait", place, tuple(self._names(name, tokens[2].place)), status, seconds)
-        raise place.error(f"'{' '.join(texts)}' is no step; known: start|stop|restart cmd|group \"NAME\"; wait ms N; wait cmd|group \"NAME\" "
-                          "status \"ready|finished|stopped\" [timeout SECONDS]; run_script \"NAME\".")
+        raise place.error(
+            f'\'{" ".join(texts)}\' is no step; known: start|stop|restart cmd|group "NAME"; wait ms N; wait cmd|group "NAME" '
+            'status "ready|finished|stopped" [timeout SECONDS]; run_script "NAME".'
+        )
 
     def _check_scripts(self) -> None:
         calls = {}
@@ -192,7 +215,7 @@ class _Reader:
             calls[name] = tuple(step.script for step in steps if step.action == "run_script")
             for step in steps:
                 if step.script and step.script not in self._list.scripts:
-                    raise step.place.error(f"there is no script \"{step.script}\".")
+                    raise step.place.error(f'there is no script "{step.script}".')
         for name, steps in self._list.scripts.items():
             if steps and (circle := _find_circle(name, calls)):
                 raise steps[0].place.error(f"script {' runs '.join(circle)}, without end.")
@@ -200,7 +223,9 @@ class _Reader:
 
 def _commands(blocks: list[Block]) -> list[Block]:
     """Also those in groups."""
-    return [block for block in blocks if block.kind == "cmd"] + [inner for block in blocks for inner in _commands(block.blocks)]
+    return [block for block in blocks if block.kind == "cmd"] + [
+        inner for block in blocks for inner in _commands(block.blocks)
+    ]
 
 
 def _read_seconds(text: str, place: Place) -> float:

@@ -51,13 +51,13 @@ class Usage:
     pids: frozenset[int] = frozenset()
     cpu_percent: float = 0.0  # since the snapshot before; 100 is one core
     total_cpu_s: float = 0.0  # of these processes since their starts
-    rss_mb: float = 0.0       # 10^6 bytes
+    rss_mb: float = 0.0  # 10^6 bytes
 
 
 class Trees:
     """Reads all processes of the machine once a snapshot."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._cpu_s: dict[int, float] = {}
         self._taken_at = 0.0
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tessera_cli.lcm_bus import Bus
-from tessera_cli.supervision.progress import FINISHED, RUNNING
 from tessera_cli.messages import stage_status_t
+from tessera_cli.supervision.progress import FINISHED, RUNNING
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,11 @@ class RunningList:
     bus: Bus
 
 
-def listen_to(name: str, run: str, settings: dict, publisher: str, on_stage: Callable[[str, stage_status_t], None]) -> RunningList:
+def listen_to(
+    name: str, run: str, settings: dict, publisher: str, on_stage: Callable[[str, stage_status_t], None]
+) -> RunningList:
     """`on_stage` gets the list's name and each status of a stage of this machine that runs. Raises RunFailed if the bus can't be opened."""
+
     def on_status(status: stage_status_t) -> None:
         if status.host == os.uname().nodename and RUNNING <= status.state <= FINISHED:
             on_stage(name, status)

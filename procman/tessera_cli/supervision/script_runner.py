@@ -5,15 +5,20 @@ import time
 from collections.abc import Callable, Iterable
 
 from tessera_cli.errors import RunFailed
-from tessera_cli.supervision.process_names import processes_of, qualify
+from tessera_cli.messages import procman_order_t
+from tessera_cli.messages import procman_process_t as states
 from tessera_cli.supervision.orders import draw_order_id
 from tessera_cli.supervision.process_list import Process, ProcessList, ScriptStep
+from tessera_cli.supervision.process_names import processes_of, qualify
 from tessera_cli.supervision.sheriff import TURN_S, Sheriff
 from tessera_cli.supervision.supervised_process import STATE_NAMES
-from tessera_cli.messages import procman_order_t, procman_process_t as states
 
 # States that fulfil a wait. (What no deputy knows of is stopped.)
-FULFILLED = {"ready": (states.READY, states.FINISHED), "finished": (states.FINISHED, states.ENDED), "stopped": (states.STOPPED, states.ENDED)}
+FULFILLED = {
+    "ready": (states.READY, states.FINISHED),
+    "finished": (states.FINISHED, states.ENDED),
+    "stopped": (states.STOPPED, states.ENDED),
+}
 # States from which it will not come without another order.
 HOPELESS = {"ready": (states.FAILED, states.ENDED), "finished": (states.FAILED,), "stopped": ()}
 
@@ -21,7 +26,9 @@ HOPELESS = {"ready": (states.FAILED, states.ENDED), "finished": (states.FAILED,)
 class ScriptRunner:
     """One run of one list: what was started so far is what the deputies are told to have."""
 
-    def __init__(self, sheriff: Sheriff, name: str, process_list: ProcessList, settings: list[str], say: Callable[[str], None]):
+    def __init__(
+        self, sheriff: Sheriff, name: str, process_list: ProcessList, settings: list[str], say: Callable[[str], None]
+    ) -> None:
         """`name`: that the deputies know the list by."""
         self._sheriff, self._name, self._list, self._settings, self._say = sheriff, name, process_list, settings, say
         self._started: set[str] = set()
@@ -68,7 +75,11 @@ class ScriptRunner:
     def _order(self, names: Iterable[str]) -> None:
         hosts = {self.host(self._list.processes[name]) for name in names}
         for host in sorted(hosts):
-            wanted = [process for name, process in self._list.processes.items() if name in self._started and self.host(process) == host]
+            wanted = [
+                process
+                for name, process in self._list.processes.items()
+                if name in self._started and self.host(process) == host
+            ]
             self._sheriff.run(host, self._name, wanted, self._settings, self._session)
 
     def _restart(self, names: Iterable[str]) -> None:
@@ -109,7 +120,9 @@ class ScriptRunner:
         if heard is None or heard.is_silent:
             return f"{name}: its deputy {host} says nothing any more"
         if process := self._process(name):
-            return f"{name} on {host} is {STATE_NAMES.get(process.state, '?')}" + (f": {process.reason}" if process.reason else "")
+            return f"{name} on {host} is {STATE_NAMES.get(process.state, '?')}" + (
+                f": {process.reason}" if process.reason else ""
+            )
         return f"{name} on {host} is not started"
 
     def _tell_changes(self, names: list[str], told: dict[str, str]) -> None:

@@ -11,14 +11,14 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tessera_cli.errors import RunFailed, UserError
 from tessera_cli.cluster.keys import KeyRing, key_folder
-from tessera_cli.supervision.process_names import processes_of, split
+from tessera_cli.errors import RunFailed, UserError
+from tessera_cli.lcm_bus import ORDER, OUTPUT, STATUS, Bus, procman_url, ttl_of
+from tessera_cli.messages import procman_order_t, procman_output_t, procman_process_t, procman_status_t
 from tessera_cli.supervision.orders import draw_order_id, sign
 from tessera_cli.supervision.process_list import Process
-from tessera_cli.lcm_bus import ORDER, OUTPUT, STATUS, Bus, procman_url, ttl_of
+from tessera_cli.supervision.process_names import processes_of, split
 from tessera_cli.supervision.wishes import to_wish
-from tessera_cli.messages import procman_order_t, procman_output_t, procman_process_t, procman_status_t
 
 TURN_S = 0.05
 # Deputies speak once a second.
@@ -46,7 +46,7 @@ def _num_distrusted(status: procman_status_t) -> int:
 
 
 class Sheriff:
-    def __init__(self, arguments: Namespace):
+    def __init__(self, arguments: Namespace) -> None:
         self._ring = KeyRing(key_folder())
         self._key = self._ring.signing_key()
         self._is_lan = bool(ttl_of(arguments))
@@ -78,7 +78,9 @@ class Sheriff:
         """Hears every deputy once."""
         self.listen(MEET_S)
         if not self.deputies:
-            raise RunFailed(f"no deputy answers on {self._bus.url}: start one on each node: procman/tessera deputy{self._hint()}")
+            raise RunFailed(
+                f"no deputy answers on {self._bus.url}: start one on each node: procman/tessera deputy{self._hint()}"
+            )
 
     def _hint(self) -> str:
         return "" if self._is_lan else " (on other machines: --lan there and here)"
@@ -87,8 +89,10 @@ class Sheriff:
         until = time.monotonic() + FIND_TIMEOUT_S
         while missing := [name for name in ids if name not in self.deputies]:
             if time.monotonic() > until:
-                raise UserError(f"no deputy answers for {', '.join(missing)}; there is: {', '.join(self.deputies) or 'none'}. "
-                                f"Start it there: procman/tessera deputy --id {missing[0]}{self._hint()}")
+                raise UserError(
+                    f"no deputy answers for {', '.join(missing)}; there is: {', '.join(self.deputies) or 'none'}. "
+                    f"Start it there: procman/tessera deputy --id {missing[0]}{self._hint()}"
+                )
             self.listen(TURN_S)
 
     def run(self, deputy: str, list_name: str, processes: list[Process], settings: list[str], session: str) -> None:
@@ -126,12 +130,18 @@ class Sheriff:
         if self.deputies[deputy].is_silent:
             return f"the deputy {deputy} says nothing any more."
         refused = ", ".join(f"{number} {kind}" for kind, number in zip(status.kinds, status.num_refused))
-        return (f"the deputy {deputy} does not obey (it has refused: {refused or 'none'}): does it trust this user's key? "
-                "procman/tessera keys shows both.")
+        return (
+            f"the deputy {deputy} does not obey (it has refused: {refused or 'none'}): does it trust this user's key? "
+            "procman/tessera keys shows both."
+        )
 
     def deputies_of(self, list_name: str) -> list[str]:
         """Those that have it, sorted."""
-        return sorted(deputy for deputy, heard in self.deputies.items() if any(each.name == list_name for each in heard.status.lists))
+        return sorted(
+            deputy
+            for deputy, heard in self.deputies.items()
+            if any(each.name == list_name for each in heard.status.lists)
+        )
 
     @property
     def lists(self) -> list[str]:
@@ -139,8 +149,11 @@ class Sheriff:
 
     def processes(self) -> dict[str, tuple[str, procman_process_t]]:
         """All of all deputies: (deputy, process) by LIST/PROCESS."""
-        return {name: (deputy, process) for deputy, heard in sorted(self.deputies.items())
-                for name, process in processes_of(heard.status).items()}
+        return {
+            name: (deputy, process)
+            for deputy, heard in sorted(self.deputies.items())
+            for name, process in processes_of(heard.status).items()
+        }
 
     def find(self, process: str) -> str:
         """LIST/PROCESS of what people call so; the list may be left out where only one has it."""

@@ -5,10 +5,10 @@ import time
 from argparse import Namespace
 
 from tessera_cli.errors import RunFailed, UserError
+from tessera_cli.messages import procman_list_t, procman_order_t, procman_output_t, procman_process_t
 from tessera_cli.supervision.process_names import split
 from tessera_cli.supervision.sheriff import TURN_S, Sheriff
 from tessera_cli.supervision.supervised_process import READY, STATE_NAMES
-from tessera_cli.messages import procman_list_t, procman_order_t, procman_output_t, procman_process_t
 
 TAIL_TIMEOUT_S = 5.0
 STOPPED = (procman_process_t.STOPPED, procman_process_t.ENDED, procman_process_t.FAILED)
@@ -33,8 +33,11 @@ def down(arguments: Namespace) -> int:
     for deputy in deputies:
         sheriff.run(deputy, arguments.name, [], [], "")
     until = time.monotonic() + arguments.timeout
-    while left := [name for name, (_, process) in sheriff.processes().items()
-                   if arguments.name in ("", split(name)[0]) and (process.pid or process.state not in STOPPED)]:
+    while left := [
+        name
+        for name, (_, process) in sheriff.processes().items()
+        if arguments.name in ("", split(name)[0]) and (process.pid or process.state not in STOPPED)
+    ]:
         if time.monotonic() > until:
             raise RunFailed(f"still running after {arguments.timeout:g} s: {', '.join(left)}.")
         sheriff.listen(TURN_S)
@@ -54,30 +57,54 @@ def status(arguments: Namespace) -> int:
 
 
 def _as_json(sheriff: Sheriff) -> dict:
-    return {deputy: {"host": heard.status.host, "cpu_percent": heard.status.cpu_percent, "memory_percent": heard.status.memory_percent,
-                     "orders_obeyed": heard.status.num_obeyed, "orders_refused": dict(zip(heard.status.kinds, heard.status.num_refused)),
-                     "lists": {each.name: _list_as_json(each) for each in heard.status.lists}}
-            for deputy, heard in sorted(sheriff.deputies.items())}
+    return {
+        deputy: {
+            "host": heard.status.host,
+            "cpu_percent": heard.status.cpu_percent,
+            "memory_percent": heard.status.memory_percent,
+            "orders_obeyed": heard.status.num_obeyed,
+            "orders_refused": dict(zip(heard.status.kinds, heard.status.num_refused)),
+            "lists": {each.name: _list_as_json(each) for each in heard.status.lists},
+        }
+        for deputy, heard in sorted(sheriff.deputies.items())
+    }
 
 
 def _list_as_json(each: procman_list_t) -> dict:
-    return {"main_url": each.main_url, "channel_prefix": each.channel_prefix,
-            "processes": {process.name: {"state": STATE_NAMES.get(process.state, "?"), "reason": process.reason, "pid": process.pid,
-                                         "starts": process.num_starts, "cpu_percent": process.cpu_percent, "rss_mb": process.rss_mb}
-                          for process in each.processes}}
+    return {
+        "main_url": each.main_url,
+        "channel_prefix": each.channel_prefix,
+        "processes": {
+            process.name: {
+                "state": STATE_NAMES.get(process.state, "?"),
+                "reason": process.reason,
+                "pid": process.pid,
+                "starts": process.num_starts,
+                "cpu_percent": process.cpu_percent,
+                "rss_mb": process.rss_mb,
+            }
+            for process in each.processes
+        },
+    }
 
 
 def print_status(sheriff: Sheriff) -> None:
     for deputy, heard in sorted(sheriff.deputies.items()):
         refused = sum(heard.status.num_refused)
-        print(f"{deputy} ({heard.status.host}): CPU {heard.status.cpu_percent:.0f} %, memory {heard.status.memory_percent:.0f} %, "
-              f"{heard.status.num_obeyed} orders obeyed, {refused} refused")
+        print(
+            f"{deputy} ({heard.status.host}): CPU {heard.status.cpu_percent:.0f} %, memory {heard.status.memory_percent:.0f} %, "
+            f"{heard.status.num_obeyed} orders obeyed, {refused} refused"
+        )
         for each in heard.status.lists:
             print(f"  {describe_list(each)}")
             for process in each.processes:
-                figures = f"{process.cpu_percent:5.0f} % {process.rss_mb:6.0f} MB  pid {process.pid}" if process.pid else ""
+                figures = (
+                    f"{process.cpu_percent:5.0f} % {process.rss_mb:6.0f} MB  pid {process.pid}" if process.pid else ""
+                )
                 state = STATE_NAMES.get(process.state, "?")
-                print(f"    {process.name:20s} {state:12s} {process.num_starts:3d} starts {figures}  {process.reason}".rstrip())
+                print(
+                    f"    {process.name:20s} {state:12s} {process.num_starts:3d} starts {figures}  {process.reason}".rstrip()
+                )
 
 
 def describe_list(each: procman_list_t) -> str:
@@ -97,7 +124,9 @@ def restart(arguments: Namespace) -> int:
     while process.num_starts == starts or process.state not in READY:
         process = sheriff.processes().get(name, (deputy, process))[1]
         if time.monotonic() > until or process.state == procman_process_t.FAILED:
-            raise RunFailed(f"{name} on {deputy} is {STATE_NAMES.get(process.state, '?')}: {process.reason or 'no reason given'}.")
+            raise RunFailed(
+                f"{name} on {deputy} is {STATE_NAMES.get(process.state, '?')}: {process.reason or 'no reason given'}."
+            )
         sheriff.listen(TURN_S)
     say(f"{name} on {deputy} is ready again")
     return 0

@@ -11,7 +11,7 @@ from tessera_cli.files import replacing
 class LogFolder:
     """One deputy at a time has it. Its processes carry the folder's path in their mark (tree.py), so that each can be found."""
 
-    def __init__(self, path: Path, taken: str):
+    def __init__(self, path: Path, taken: str) -> None:
         """Makes the folder. `taken`: the sentence if another deputy has it."""
         self.path = path
         try:
@@ -35,8 +35,11 @@ class LogFolder:
 class StateFolder(LogFolder):
     """Of a node's deputy."""
 
-    def __init__(self, path: Path, deputy: str):
-        super().__init__(path, f"a deputy with the id {deputy} and this port runs on this machine already: give --id NAME or --port N.")
+    def __init__(self, path: Path, deputy: str) -> None:
+        super().__init__(
+            path,
+            f"a deputy with the id {deputy} and this port runs on this machine already: give --id NAME or --port N.",
+        )
         (path / "orders").mkdir(exist_ok=True)
 
     def log_path(self, process: str) -> Path:

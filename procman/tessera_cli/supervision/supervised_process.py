@@ -12,10 +12,10 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from tessera_cli.messages import procman_process_t as states
 from tessera_cli.supervision.child_process import Child, Launch, describe_exit
 from tessera_cli.supervision.log_file import RotatingLog
 from tessera_cli.supervision.process_tree import Usage
-from tessera_cli.messages import procman_process_t as states
 
 # A start after a death waits this long, twice as long each time in a row.
 FIRST_BACK_OFF_S = 0.1
@@ -28,16 +28,18 @@ STABLE_AFTER_S = 10.0
 MAX_DEATHS_IN_A_ROW = 6
 # Of its output, what is kept to be quoted as its last words.
 MAX_LINE = 4000
-STATE_NAMES = {getattr(states, name): name.lower().replace("_", " ")
-               for name in ("WAITING", "STARTING", "READY", "FINISHED", "BACKING_OFF", "STOPPING", "STOPPED", "ENDED", "FAILED")}
+STATE_NAMES = {
+    getattr(states, name): name.lower().replace("_", " ")
+    for name in ("WAITING", "STARTING", "READY", "FINISHED", "BACKING_OFF", "STOPPING", "STOPPED", "ENDED", "FAILED")
+}
 UP = (states.STARTING, states.READY, states.FINISHED)
 READY = (states.READY, states.FINISHED)
 
 
 @dataclass(frozen=True)
 class Death:
-    status: int      # exit status; negative: by that signal
-    how: str         # goes on after its name: "was killed by SIGKILL", "was not ready within 30 s"
+    status: int  # exit status; negative: by that signal
+    how: str  # goes on after its name: "was killed by SIGKILL", "was not ready within 30 s"
     last_words: str  # the last line of its output
 
 
@@ -50,20 +52,20 @@ class Supervised:
     state: int = states.WAITING
     reason: str = ""
     wanted: Launch | None = None
-    session: str = ""   # of the order that wants it; a new one tries again what ended or failed
+    session: str = ""  # of the order that wants it; a new one tries again what ended or failed
     num_starts: int = 0
     started_at: float = 0.0
     usage: Usage = field(default_factory=Usage)
-    cpu_s: float = 0.0       # of the lives that are over, as the kernel accounts them
+    cpu_s: float = 0.0  # of the lives that are over, as the kernel accounts them
     max_rss_mb: float = 0.0  # the highest peak of them
-    num_deaths: int = 0      # ends that nobody had asked for
+    num_deaths: int = 0  # ends that nobody had asked for
     last_death: Death | None = None  # of the last life, however it ended; None: it lives, or can't be started
     child: Child | None = None
     _running: Launch | None = None
     _heard_at: float = 0.0
     _due_at: float = 0.0
     _kill_at: float | None = None  # set while it is asked to end
-    _fate: str = ""                # why we killed it
+    _fate: str = ""  # why we killed it
     _deaths: int = 0
     _last_line: bytes = b""
 

@@ -4,12 +4,12 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from tessera_cli.messages import procman_process_t
 from tessera_cli.supervision.child_process import Child, Launch
 from tessera_cli.supervision.log_file import RotatingLog
+from tessera_cli.supervision.process_tree import Trees
 from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.supervision.supervised_process import READY, STATE_NAMES, Supervised
-from tessera_cli.supervision.process_tree import Trees
-from tessera_cli.messages import procman_process_t
 
 USAGE_PERIOD_S = 1.0
 # Deputies speak once a second; one that was not heard for longer may be gone, and its processes with it.
@@ -19,7 +19,7 @@ LONGEST_TURN_S = 1.0
 
 
 class Crew:
-    def __init__(self, folder: LogFolder, on_output: Callable[[str, bytes], None]):
+    def __init__(self, folder: LogFolder, on_output: Callable[[str, bytes], None]) -> None:
         self._folder, self._on_output = folder, on_output
         self._members: dict[str, Supervised] = {}
         self._others: dict[str, tuple[int, float]] = {}  # (state, when heard)
@@ -52,18 +52,29 @@ class Crew:
 
     def news(self) -> list[str]:
         """A sentence for each process whose state has changed."""
-        now = {member.name: f"{member.name} is {STATE_NAMES[member.state]}" + (f": {member.reason}" if member.reason else "")
-               for member in self._members.values()}
+        now = {
+            member.name: f"{member.name} is {STATE_NAMES[member.state]}"
+            + (f": {member.reason}" if member.reason else "")
+            for member in self._members.values()
+        }
         changed = [sentence for name, sentence in now.items() if self._told.get(name) != sentence]
         self._told = now
         return changed
 
     def generations(self, run: str) -> dict[str, int]:
-        return {name: member.wanted.generation for name, member in self._members.items() if member.wanted and member.wanted.run == run}
+        return {
+            name: member.wanted.generation
+            for name, member in self._members.items()
+            if member.wanted and member.wanted.run == run
+        }
 
     def want(self, launches: dict[str, Launch], session: str, of: str = "") -> None:
         """Of those whose names begin with `of` exactly these; the others are ended. Those that ended before are forgotten."""
-        for name in [name for name, member in self._members.items() if name.startswith(of) and member.is_idle and name not in launches]:
+        for name in [
+            name
+            for name, member in self._members.items()
+            if name.startswith(of) and member.is_idle and name not in launches
+        ]:
             self._members.pop(name).log.close()
         for name in [name for name in launches if name not in self._members]:
             log = RotatingLog(self._folder.log_path(name))
@@ -105,8 +116,12 @@ class Crew:
             self._usage_at = now
             self._measure(now)
         # What has done its last work needs nobody any more.
-        needed = {name for member in self._members.values() if member.child and member.state != procman_process_t.FINISHED
-                  for name in member.depends}
+        needed = {
+            name
+            for member in self._members.values()
+            if member.child and member.state != procman_process_t.FINISHED
+            for name in member.depends
+        }
         for member in self._members.values():
             member.step(now, self._is_not_ready, member.name in needed)
 

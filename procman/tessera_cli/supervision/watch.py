@@ -6,17 +6,23 @@ from argparse import Namespace
 from collections import deque
 
 from tessera_cli.interrupt import Interrupt
-from tessera_cli.supervision.sheriff_commands import describe_list, print_status
+from tessera_cli.messages import procman_output_t, procman_process_t, stage_status_t
 from tessera_cli.supervision.list_monitor import ListView
 from tessera_cli.supervision.sheriff import Sheriff
+from tessera_cli.supervision.sheriff_commands import describe_list, print_status
 from tessera_cli.supervision.supervised_process import STATE_NAMES
-from tessera_cli.messages import procman_output_t, procman_process_t, stage_status_t
 
 PANEL_PERIOD_S = 0.5
 LINES_PERIOD_S = 5.0
 NUM_LINES = 6
-STYLES = {procman_process_t.READY: "green", procman_process_t.FINISHED: "green", procman_process_t.FAILED: "bold red",
-          procman_process_t.BACKING_OFF: "yellow", procman_process_t.WAITING: "yellow", procman_process_t.STARTING: "yellow"}
+STYLES = {
+    procman_process_t.READY: "green",
+    procman_process_t.FINISHED: "green",
+    procman_process_t.FAILED: "bold red",
+    procman_process_t.BACKING_OFF: "yellow",
+    procman_process_t.WAITING: "yellow",
+    procman_process_t.STARTING: "yellow",
+}
 
 
 def main(arguments: Namespace) -> int:
@@ -26,7 +32,7 @@ def main(arguments: Namespace) -> int:
 
 
 class Watcher:
-    def __init__(self, arguments: Namespace):
+    def __init__(self, arguments: Namespace) -> None:
         self._sheriff = Sheriff(arguments)
         self._sheriff.on_output(self._on_output)
         self._views: dict[tuple[str, str, str], ListView] = {}  # by list, bus and prefix
@@ -38,8 +44,11 @@ class Watcher:
 
     def _follow_lists(self) -> None:
         """Listens to lists that came, and no longer to those that went."""
-        wanted = {(each.name, each.main_url, each.channel_prefix)
-                  for heard in self._sheriff.deputies.values() for each in heard.status.lists}
+        wanted = {
+            (each.name, each.main_url, each.channel_prefix)
+            for heard in self._sheriff.deputies.values()
+            for each in heard.status.lists
+        }
         self._views = {key: self._views.get(key) or ListView(*key[1:]) for key in sorted(wanted)}
         self._sheriff.also_listen_to([view.bus for view in self._views.values()])
 
@@ -79,7 +88,11 @@ class Watcher:
         from rich.text import Text
 
         lines = Text("\n".join(self._lines) or "no output yet", style="dim", overflow="ellipsis", no_wrap=True)
-        return Panel(Group(Text("\n".join(self._progress_lines())), self._draw_table(), lines), title="tessera watch", box=box.ROUNDED)
+        return Panel(
+            Group(Text("\n".join(self._progress_lines())), self._draw_table(), lines),
+            title="tessera watch",
+            box=box.ROUNDED,
+        )
 
     def _draw_table(self):
         from rich import box
@@ -96,8 +109,16 @@ class Watcher:
             status = heard.status
             refused = sum(status.num_refused)
             said = "says nothing any more" if heard.is_silent else f"{refused} orders refused" if refused else ""
-            table.add_row(Text(deputy, style="bold"), Text("silent" if heard.is_silent else "", style="bold red"), "", "", "",
-                          f"{status.cpu_percent:.0f}", f"{status.memory_percent:.0f} %", Text(said))
+            table.add_row(
+                Text(deputy, style="bold"),
+                Text("silent" if heard.is_silent else "", style="bold red"),
+                "",
+                "",
+                "",
+                f"{status.cpu_percent:.0f}",
+                f"{status.memory_percent:.0f} %",
+                Text(said),
+            )
             for each in status.lists:
                 table.add_row(Text(f"  {describe_list(each)}", style="dim"))
                 statuses = self._views[each.name, each.main_url, each.channel_prefix].statuses
@@ -110,6 +131,13 @@ class Watcher:
         from rich.text import Text
 
         runs = bool(process.pid)
-        return (f"    {process.name}", Text(STATE_NAMES.get(process.state, "?"), style=STYLES.get(process.state, "")), str(process.num_starts),
-                str(stage.queue) if stage else "", f"{stage.step_median_ms:.1f}" if stage else "",
-                f"{process.cpu_percent:.0f}" if runs else "", f"{process.rss_mb:.0f}" if runs else "", Text(process.reason))
+        return (
+            f"    {process.name}",
+            Text(STATE_NAMES.get(process.state, "?"), style=STYLES.get(process.state, "")),
+            str(process.num_starts),
+            str(stage.queue) if stage else "",
+            f"{stage.step_median_ms:.1f}" if stage else "",
+            f"{process.cpu_percent:.0f}" if runs else "",
+            f"{process.rss_mb:.0f}" if runs else "",
+            Text(process.reason),
+        )

@@ -4,12 +4,12 @@ import hashlib
 from dataclasses import fields
 
 from tessera_cli.errors import UserError
+from tessera_cli.messages import procman_wish_t
 from tessera_cli.supervision.attributes import MAX_INSTANCES, NAME, OPTIONS, RunOptions
 from tessera_cli.supervision.child_process import Launch
 from tessera_cli.supervision.command_list import LocalCommand
-from tessera_cli.supervision.process_names import qualify
 from tessera_cli.supervision.process_list import Process
-from tessera_cli.messages import procman_wish_t
+from tessera_cli.supervision.process_names import qualify
 
 
 def run_of(settings: list[str]) -> str:
@@ -26,8 +26,14 @@ def to_wish(process: Process) -> procman_wish_t:
     return wish
 
 
-def to_launch(wish: procman_wish_t, commands: dict[str, LocalCommand], values: dict[str, str], run: str, generation: int,
-              list_name: str = "") -> Launch:
+def to_launch(
+    wish: procman_wish_t,
+    commands: dict[str, LocalCommand],
+    values: dict[str, str],
+    run: str,
+    generation: int,
+    list_name: str = "",
+) -> Launch:
     """`values`: of the placeholders, but for the process's own. `list_name`: empty where there is but one list.
 
     Raises UserError for a wish that can't be granted.
@@ -39,7 +45,16 @@ def to_launch(wish: procman_wish_t, commands: dict[str, LocalCommand], values: d
         raise UserError(f"'{wish.command}' is not in this deputy's command list, which has: {', '.join(commands)}.")
     words = command.fill({**values, "name": wish.name, "id": str(wish.instance)})
     depends = tuple(qualify(list_name, name) for name in wish.depends)
-    return Launch(tuple(words), command.folder, tuple(command.environment.items()), wish.command, depends, _options(wish), run, generation)
+    return Launch(
+        tuple(words),
+        command.folder,
+        tuple(command.environment.items()),
+        wish.command,
+        depends,
+        _options(wish),
+        run,
+        generation,
+    )
 
 
 def _options(wish: procman_wish_t) -> RunOptions:
@@ -47,7 +62,13 @@ def _options(wish: procman_wish_t) -> RunOptions:
     values["cpus"] = tuple(wish.cpus)
     try:
         for name, value in values.items():
-            text = ",".join(map(str, value)) if name == "cpus" else f"{value:g}" if isinstance(value, float) else str(value)
+            text = (
+                ",".join(map(str, value))
+                if name == "cpus"
+                else f"{value:g}"
+                if isinstance(value, float)
+                else str(value)
+            )
             if text:
                 OPTIONS[name](text)
     except ValueError as error:
