@@ -1,7 +1,6 @@
 // tessera-settings: writes all settings, with overrides, into one file that every process of a run reads. The launcher
 // uses it, so that a wrong key or value is found before anything starts. Exit status 2 and one sentence on bad input.
 #include <CLI/CLI.hpp>
-
 #include <filesystem>
 #include <fstream>
 #include <iostream>

@@ -47,15 +47,20 @@ GrayImage Shrink(GrayImage image, int width) {
   return smaller;
 }
 
-void CutPhoto(const std::string& path, const TrainingViewOptions& options, std::mt19937_64& generator, const UseView& use) {
+void CutPhoto(const std::string& path, const TrainingViewOptions& options, std::mt19937_64& generator,
+              const UseView& use) {
   const GrayImage photo = ReadGrayImage(path);
   for (int view = 0; view < options.num_views; ++view) {
     const Rect rect = ChooseView(photo, view, generator);
     const int width = static_cast<int>(Uniform(kMinWidthPx, kMaxWidthPx, generator));
     const GrayImage image = Shrink(Crop(photo, rect), width);
     if (std::min(image.width, image.height) < kMinSidePx) continue;
-    use(image, {.width_px = image.width, .height_px = image.height, .fx_px = 0.8 * image.width, .fy_px = 0.8 * image.width,
-                .cx_px = 0.5 * image.width, .cy_px = 0.5 * image.height});
+    use(image, {.width_px = image.width,
+                .height_px = image.height,
+                .fx_px = 0.8 * image.width,
+                .fy_px = 0.8 * image.width,
+                .cx_px = 0.5 * image.width,
+                .cy_px = 0.5 * image.height});
   }
 }
 

@@ -12,10 +12,10 @@
 namespace tessera {
 
 struct TrainingViewOptions {
-  int64_t every = 10;   // of a source, every so many frames: neighbours show the same
-  int num_views = 4;    // of a photo: all of it, and parts of it as if seen from nearer
+  int64_t every = 10;            // of a source, every so many frames: neighbours show the same
+  int num_views = 4;             // of a photo: all of it, and parts of it as if seen from nearer
   std::string calibration_path;  // of the sources that need one (SourceOptions)
-  uint64_t seed = 1;    // of the choice of parts
+  uint64_t seed = 1;             // of the choice of parts
 };
 
 // Calls `use` with each image and its camera; of photos, whose camera nobody knows, a plausible one. `source` is as in

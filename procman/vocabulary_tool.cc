@@ -1,7 +1,6 @@
-// tessera-vocabulary: trains a vocabulary of binary words and tells what is in one. Exit status 2 and one sentence on bad
-// input.
+// tessera-vocabulary: trains a vocabulary of binary words and tells what is in one. Exit status 2 and one sentence on
+// bad input.
 #include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -73,8 +72,9 @@ void Train(const Arguments& arguments) {
   VocabularyTree tree = TrainVocabulary(images, arguments.vocabulary);
   tree.origin = "trained on " + std::to_string(num_descriptors) + " descriptors of " + std::to_string(images.size()) +
                 " images: every frame in " + std::to_string(arguments.views.every) + ", " +
-                std::to_string(arguments.views.num_views) + " views of each photo; k = " +
-                std::to_string(arguments.vocabulary.num_children) + ", seed " + std::to_string(arguments.vocabulary.seed);
+                std::to_string(arguments.views.num_views) +
+                " views of each photo; k = " + std::to_string(arguments.vocabulary.num_children) + ", seed " +
+                std::to_string(arguments.vocabulary.seed);
   const Vocabulary vocabulary(std::move(tree));
   vocabulary.Save(arguments.path);
   Print(vocabulary);
@@ -83,7 +83,8 @@ void Train(const Arguments& arguments) {
 void AddTrainingOptions(CLI::App& train, Arguments& arguments) {
   train.add_option("OUT", arguments.path, "the file to write")->required();
   train.add_option("SOURCE", arguments.sources, "a source as of `run`, or a folder of photos")->required();
-  train.add_option("--every", arguments.views.every, "take one frame in so many of a source")->check(CLI::PositiveNumber);
+  train.add_option("--every", arguments.views.every, "take one frame in so many of a source")
+      ->check(CLI::PositiveNumber);
   train.add_option("--views", arguments.views.num_views, "views cut out of each photo")->check(CLI::PositiveNumber);
   train.add_option("--camera", arguments.views.calibration_path, "calibration, where the source brings none");
   train.add_option("--features", arguments.features.num_features, "keypoints per image");

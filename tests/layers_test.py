@@ -1,4 +1,4 @@
-"""The layers of modules/: includes point down only, stages don't know each other, and transport alone sees LCM."""
+"""The layers of modules/: includes point down only, stages don't know each other, and only wire and runtime see LCM."""
 
 import re
 from pathlib import Path
@@ -65,12 +65,12 @@ def test_no_stage_includes_another() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_transport_alone_sees_lcm() -> None:
+def test_runtime_and_wire_alone_see_lcm() -> None:
     wrong = [
         f'{path.relative_to(MODULES)} includes "{header}"'
         for path in sources()
         for _, header in includes(path)
-        if LCM_HEADER.match(header) and layer_of(path) != "transport"
+        if LCM_HEADER.match(header) and layer_of(path) not in ("wire", "streams", "runtime")
     ]
     assert not wrong, "\n".join(wrong)
 
@@ -85,12 +85,12 @@ def test_nothing_is_drawn_at_random_without_a_seed() -> None:
 
 
 def test_pure_modules_have_no_clock_and_no_threads() -> None:
-    """Logical time only: below transport nothing reads a clock or starts a thread."""
+    """Logical time only: below the runtime nothing reads a clock or starts a thread."""
     forbidden = {"chrono", "ctime", "time.h", "sys/time.h", "thread", "mutex", "atomic", "future"}
     wrong = [
         f"{path.relative_to(MODULES)} includes <{header}>"
         for path in sources()
-        if layer_of(path) not in ("transport", "stages")
+        if layer_of(path) not in ("runtime", "stages")
         for _, header in includes(path)
         if header in forbidden
     ]

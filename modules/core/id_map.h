@@ -29,9 +29,7 @@ class IdMap {
   ~IdMap() = default;
 
   // Null if there is no such id.
-  const Value* Find(Key key) const {
-    return Has(key) ? slots_[static_cast<size_t>(key.value)].get() : nullptr;
-  }
+  const Value* Find(Key key) const { return Has(key) ? slots_[static_cast<size_t>(key.value)].get() : nullptr; }
   Value* Find(Key key) { return Has(key) ? slots_[static_cast<size_t>(key.value)].get() : nullptr; }
   bool Has(Key key) const {
     return key.valid() && static_cast<size_t>(key.value) < slots_.size() &&

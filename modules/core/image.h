@@ -29,7 +29,9 @@ struct Image {
 
   Image() = default;
   Image(int width_px, int height_px, Pixel fill = {})
-      : width(width_px), height(height_px), pixels(static_cast<size_t>(width_px) * static_cast<size_t>(height_px), fill) {}
+      : width(width_px),
+        height(height_px),
+        pixels(static_cast<size_t>(width_px) * static_cast<size_t>(height_px), fill) {}
 
   bool empty() const { return pixels.empty(); }
   Pixel* row(int y) { return pixels.data() + static_cast<ptrdiff_t>(y) * width; }

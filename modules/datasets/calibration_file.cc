@@ -15,8 +15,7 @@ namespace {
 // A map of the file, which complains with the file's path and the full name of the key.
 class Section {
  public:
-  Section(std::string path, std::string prefix, YAML::Node node,
-          std::initializer_list<const char*> known_keys)
+  Section(std::string path, std::string prefix, YAML::Node node, std::initializer_list<const char*> known_keys)
       : path_(std::move(path)), prefix_(std::move(prefix)), node_(std::move(node)) {
     if (!node_.IsMap()) {
       throw InputError("calibration file " + path_ +
@@ -137,8 +136,8 @@ CameraRig LoadCalibrationFile(const std::string& path) {
     throw InputError("calibration file " + path + " is not valid YAML: " + error.what());
   }
   const Section section(path, "", document,
-                        {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion",
-                         "depth_unit_m", "baseline_m", "right"});
+                        {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion", "depth_unit_m",
+                         "baseline_m", "right"});
   CameraRig rig;
   rig.left = ReadPinhole(section);
   if (section.Has("width_px") || section.Has("height_px")) {

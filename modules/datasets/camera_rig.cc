@@ -55,8 +55,7 @@ CameraRig RectifiedPair(const PinholeCamera& camera, double baseline_m) {
 }
 
 bool IsRotation(const Eigen::Matrix3d& matrix) {
-  return (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm() <= 1e-2 &&
-         matrix.determinant() > 0.0;
+  return (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm() <= 1e-2 && matrix.determinant() > 0.0;
 }
 
 }  // namespace tessera

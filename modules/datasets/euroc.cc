@@ -54,11 +54,9 @@ Sensor ParseSensorFile(const YAML::Node& document, const std::string& path) {
   const std::vector<double> intrinsics = Numbers(document["intrinsics"], "intrinsics", path);
   const std::vector<double> resolution = Numbers(document["resolution"], "resolution", path);
   const auto is_size = [](double pixels) { return pixels >= 1.0 && pixels <= 16384.0; };
-  if (intrinsics.size() != 4 || resolution.size() != 2 || !is_size(resolution[0]) ||
-      !is_size(resolution[1])) {
-    throw InputError(
-        "file " + path +
-        ": `intrinsics` must have 4 numbers and `resolution` 2 from 1 to 16384: repair the file");
+  if (intrinsics.size() != 4 || resolution.size() != 2 || !is_size(resolution[0]) || !is_size(resolution[1])) {
+    throw InputError("file " + path +
+                     ": `intrinsics` must have 4 numbers and `resolution` 2 from 1 to 16384: repair the file");
   }
   Sensor sensor;
   sensor.camera.width_px = static_cast<int>(resolution[0]);
@@ -111,8 +109,8 @@ PoseTrack ReadBodyTrack(const fs::path& path) {
     if (std::abs(rotation.norm() - 1.0) > 0.1) {
       throw InputError(row.place + ": fields 5 to 8 are not a unit quaternion w x y z: repair the file");
     }
-    world_from_body.Add(row.Integer(0), {rotation.normalized(),
-                                         Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});
+    world_from_body.Add(row.Integer(0),
+                        {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});
   }
   return world_from_body;
 }
@@ -138,8 +136,7 @@ std::vector<int64_t> OpenImages(const fs::path& mav, SensorType sensor, Recordin
     }
   }
   if (times_ns.empty()) {
-    throw InputError("folder " + mav.string() +
-                     ": no image of cam0 has the time of one of cam1: use --sensor mono");
+    throw InputError("folder " + mav.string() + ": no image of cam0 has the time of one of cam1: use --sensor mono");
   }
   const size_t num_single = left.size() + right.size() - left_paths.size() - right_paths.size();
   if (num_single > 0) {
@@ -174,8 +171,7 @@ Recording LoadEuroc(const std::string& folder, const SourceOptions& options) {
   if (options.sensor == SensorType::kRgbd) {
     throw InputError("EuRoC sequence " + folder + " has no depth images: use --sensor mono or stereo");
   }
-  const fs::path mav =
-      fs::is_directory(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  const fs::path mav = fs::is_directory(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
   if (!fs::is_directory(mav / "cam0")) {
     throw InputError("folder " + folder +
                      " does not hold mav0/cam0: give the folder of a EuRoC sequence, such as .../MH_01");
@@ -198,8 +194,7 @@ Recording LoadEuroc(const std::string& folder, const SourceOptions& options) {
     }
   }
   const std::vector<int64_t> times_ns = OpenImages(mav, options.sensor, recording);
-  ReadGroundTruth(mav / "state_groundtruth_estimate0" / "data.csv", left.body_from_sensor, times_ns,
-                  recording);
+  ReadGroundTruth(mav / "state_groundtruth_estimate0" / "data.csv", left.body_from_sensor, times_ns, recording);
   return recording;
 }
 

@@ -18,10 +18,10 @@ namespace tessera {
 struct SourceOptions {
   std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME
   SensorType sensor = SensorType::kMono;  // mono takes the left images of a pair
-  std::string calibration_path;  // YAML (calibration_file.h), instead of the source's own; empty: its own
-  double depth_unit_m = 0.0;     // RGB-D: metres per count, instead of what the source says; 0: as it says
-  int64_t first_frame = 0;       // frames first_frame .. last_frame - 1 are wanted
-  int64_t last_frame = -1;       // -1: to the end
+  std::string calibration_path;           // YAML (calibration_file.h), instead of the source's own; empty: its own
+  double depth_unit_m = 0.0;              // RGB-D: metres per count, instead of what the source says; 0: as it says
+  int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
+  int64_t last_frame = -1;                // -1: to the end
 };
 
 class FrameSource {
@@ -36,8 +36,8 @@ class FrameSource {
   virtual const std::vector<GroundTruthPose>& ground_truth() const = 0;
   // The next frame; nullopt at the end. Throws InputError at an image that is damaged or of another size.
   virtual std::optional<CameraFrame> Next() = 0;
-  // Frames below this number are not needed any more. A source that has to read them on its way to the others yields them
-  // all the same.
+  // Frames below this number are not needed any more. A source that has to read them on its way to the others yields
+  // them all the same.
   virtual void SkipTo(FrameId /*frame*/) {}
   // Whether frames come by themselves and can't be made to wait.
   virtual bool is_live() const = 0;

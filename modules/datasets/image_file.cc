@@ -111,9 +111,7 @@ Image<Pixel> CopyPixels(const cv::Mat& mat) {
 
 }  // namespace
 
-GrayImage ReadGrayImage(const std::string& path) {
-  return CopyPixels<uint8_t>(Decode(path, cv::IMREAD_GRAYSCALE));
-}
+GrayImage ReadGrayImage(const std::string& path) { return CopyPixels<uint8_t>(Decode(path, cv::IMREAD_GRAYSCALE)); }
 
 DepthImage ReadDepthImage(const std::string& path) {
   const cv::Mat depth = Decode(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
@@ -149,12 +147,10 @@ std::string FindImage(const std::string& path) {
   return "";
 }
 
-void RequireSize(int width_px, int height_px, int expected_width_px, int expected_height_px,
-                 const std::string& what) {
+void RequireSize(int width_px, int height_px, int expected_width_px, int expected_height_px, const std::string& what) {
   if (width_px != expected_width_px || height_px != expected_height_px) {
-    throw InputError(what + " is " + std::to_string(width_px) + "x" + std::to_string(height_px) +
-                     " px, but " + std::to_string(expected_width_px) + "x" +
-                     std::to_string(expected_height_px) +
+    throw InputError(what + " is " + std::to_string(width_px) + "x" + std::to_string(height_px) + " px, but " +
+                     std::to_string(expected_width_px) + "x" + std::to_string(expected_height_px) +
                      " px is what the calibration or the first image says: all images must have one size");
   }
 }

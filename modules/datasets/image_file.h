@@ -23,7 +23,6 @@ std::vector<std::string> ListImages(const std::string& folder);
 std::string FindImage(const std::string& path);
 
 // Throws InputError with what is wrong and where if the image isn't of this size.
-void RequireSize(int width_px, int height_px, int expected_width_px, int expected_height_px,
-                 const std::string& what);
+void RequireSize(int width_px, int height_px, int expected_width_px, int expected_height_px, const std::string& what);
 
 }  // namespace tessera

@@ -45,8 +45,7 @@ class VideoImages : public ImageReader {
 
  private:
   [[noreturn]] void ComplainOfEnd() const {
-    throw InputError("video " + path_ + " ends after " + std::to_string(next_) + " of " +
-                     std::to_string(num_images_) +
+    throw InputError("video " + path_ + " ends after " + std::to_string(next_) + " of " + std::to_string(num_images_) +
                      " images: it is truncated; copy it again, or ask for fewer frames");
   }
 
@@ -73,8 +72,7 @@ void RequireFolder(const std::string& folder) {
   }
   const std::filesystem::directory_iterator files(folder, error);
   if (error || files == std::filesystem::directory_iterator()) {
-    throw InputError("folder " + folder +
-                     " is empty or may not be read: give the folder that holds the data set");
+    throw InputError("folder " + folder + " is empty or may not be read: give the folder that holds the data set");
   }
 }
 

@@ -22,8 +22,7 @@ using Projection = std::array<double, 12>;  // 3x4, row by row
 int CameraOfLabel(std::string label) {
   if (label.ends_with(':')) label.pop_back();
   for (const std::string prefix : {"P_rect_0", "P"}) {
-    if (label.size() == prefix.size() + 1 && label.starts_with(prefix) && label.back() >= '0' &&
-        label.back() <= '9') {
+    if (label.size() == prefix.size() + 1 && label.starts_with(prefix) && label.back() >= '0' && label.back() <= '9') {
       return label.back() - '0';
     }
   }
@@ -47,8 +46,7 @@ std::map<int, Projection> ReadProjections(const std::string& path) {
       continue;  // Tr, R_rect, dates: of other sensors
     }
     if (row.fields.size() != 12) {
-      throw InputError(row.place + ": P" + std::to_string(camera) + " has " +
-                       std::to_string(row.fields.size()) +
+      throw InputError(row.place + ": P" + std::to_string(camera) + " has " + std::to_string(row.fields.size()) +
                        " numbers instead of the 12 of a 3x4 projection matrix: repair the file");
     }
     for (size_t i = 0; i < 12; ++i) {
@@ -62,8 +60,7 @@ std::map<int, Projection> ReadProjections(const std::string& path) {
 CameraRig ReadCalibration(const std::string& path, SensorType sensor) {
   const std::map<int, Projection> projections = ReadProjections(path);
   if (!projections.contains(0)) {
-    throw InputError("file " + path +
-                     " has no row `P0:` of 12 numbers: repair the file or give --camera FILE.yaml");
+    throw InputError("file " + path + " has no row `P0:` of 12 numbers: repair the file or give --camera FILE.yaml");
   }
   const Projection& left = projections.at(0);
   PinholeCamera camera;
@@ -78,9 +75,8 @@ CameraRig ReadCalibration(const std::string& path, SensorType sensor) {
     return {.left = camera};
   }
   if (!projections.contains(1)) {
-    throw InputError(
-        "file " + path +
-        " has no row `P1:` of 12 numbers, which stereo needs: use --sensor mono, or repair the file");
+    throw InputError("file " + path +
+                     " has no row `P1:` of 12 numbers, which stereo needs: use --sensor mono, or repair the file");
   }
   const double baseline_m = (left[3] - projections.at(1)[3]) / left[0];
   if (!(baseline_m > 0.0)) {
@@ -107,8 +103,7 @@ void RequireNoGap(const std::vector<std::string>& paths) {
   }
 }
 
-std::unique_ptr<ImageReader> OpenCamera(const fs::path& folder, const std::string& camera,
-                                        int64_t num_times) {
+std::unique_ptr<ImageReader> OpenCamera(const fs::path& folder, const std::string& camera, int64_t num_times) {
   std::vector<std::string> paths = ListImages(folder / camera);
   if (!paths.empty()) {
     RequireNoGap(paths);
@@ -137,8 +132,7 @@ void OpenImages(const std::string& folder, SensorType sensor, Recording& recordi
   }
   if (num_times > num_images) {
     recording.notes.push_back("There are " + std::to_string(num_times) + " times but only " +
-                              std::to_string(num_images) + " images in " + folder +
-                              ": the later times are not used.");
+                              std::to_string(num_images) + " images in " + folder + ": the later times are not used.");
   }
   recording.utimes_us.resize(static_cast<size_t>(num_images));
   if (sensor != SensorType::kStereo) {
@@ -146,9 +140,8 @@ void OpenImages(const std::string& folder, SensorType sensor, Recording& recordi
   }
   recording.right = OpenCamera(folder, "image_1", num_times);
   if (!recording.right) {
-    throw InputError(
-        "folder " + folder +
-        " holds neither images in image_1/ nor image_1.mp4, which stereo needs: use --sensor mono");
+    throw InputError("folder " + folder +
+                     " holds neither images in image_1/ nor image_1.mp4, which stereo needs: use --sensor mono");
   }
   if (recording.right->num_images() != num_images) {
     throw InputError("folder " + folder + " has " + std::to_string(num_images) + " images in image_0 but " +
@@ -160,12 +153,10 @@ void OpenImages(const std::string& folder, SensorType sensor, Recording& recordi
 void ReadPoses(const std::string& folder, Recording& recording) {
   const fs::path sequence = fs::weakly_canonical(folder);
   const fs::path inside = sequence / "poses.txt";
-  const fs::path beside =
-      sequence.parent_path().parent_path() / "poses" / (sequence.filename().string() + ".txt");
+  const fs::path beside = sequence.parent_path().parent_path() / "poses" / (sequence.filename().string() + ".txt");
   const fs::path path = fs::exists(inside) ? inside : beside;
   if (!fs::exists(path)) {
-    recording.notes.push_back("No ground truth: neither " + inside.string() + " nor " + beside.string() +
-                              " exists.");
+    recording.notes.push_back("No ground truth: neither " + inside.string() + " nor " + beside.string() + " exists.");
     return;
   }
   const std::vector<TextRow> rows = ReadRows(path);
@@ -179,13 +170,13 @@ void ReadPoses(const std::string& folder, Recording& recording) {
     if (!IsRotation(rotation)) {
       throw InputError(rows[i].place + ": the 3x4 matrix does not begin with a rotation: repair the file");
     }
-    recording.ground_truth.push_back({FrameId{static_cast<int64_t>(i)}, recording.utimes_us[i],
-                                      Rigid3::FromMatrix(rotation, matrix.col(3))});
+    recording.ground_truth.push_back(
+        {FrameId{static_cast<int64_t>(i)}, recording.utimes_us[i], Rigid3::FromMatrix(rotation, matrix.col(3))});
   }
   if (rows.size() != recording.utimes_us.size()) {
-    recording.notes.push_back("Ground truth " + path.string() + " has " + std::to_string(rows.size()) +
-                              " poses for " + std::to_string(recording.utimes_us.size()) +
-                              " images: the first " + std::to_string(count) + " are used.");
+    recording.notes.push_back("Ground truth " + path.string() + " has " + std::to_string(rows.size()) + " poses for " +
+                              std::to_string(recording.utimes_us.size()) + " images: the first " +
+                              std::to_string(count) + " are used.");
   }
 }
 
@@ -197,9 +188,8 @@ Recording LoadKitti(const std::string& folder, const SourceOptions& options) {
     throw InputError("KITTI sequence " + folder + " has no depth images: use --sensor mono or stereo");
   }
   Recording recording;
-  recording.rig = options.calibration_path.empty()
-                      ? ReadCalibration(fs::path(folder) / "calib.txt", options.sensor)
-                      : LoadCalibrationFile(options.calibration_path);
+  recording.rig = options.calibration_path.empty() ? ReadCalibration(fs::path(folder) / "calib.txt", options.sensor)
+                                                   : LoadCalibrationFile(options.calibration_path);
   recording.times_path = fs::path(folder) / "times.txt";
   for (const TextRow& row : ReadRows(recording.times_path)) {
     recording.utimes_us.push_back(MicrosecondsFromSeconds(row.Number(0)));

@@ -8,8 +8,7 @@
 namespace tessera {
 
 std::optional<PinholeCamera> PinholeFromText(const std::string& text) {
-  static const std::regex kChain(R"(((?:\b(?:fx|fy|cx|cy)\s*[=:]\s*)+)([0-9]+(?:\.[0-9]+)?))",
-                                 std::regex::icase);
+  static const std::regex kChain(R"(((?:\b(?:fx|fy|cx|cy)\s*[=:]\s*)+)([0-9]+(?:\.[0-9]+)?))", std::regex::icase);
   static const std::regex kKey(R"(fx|fy|cx|cy)", std::regex::icase);
   std::map<std::string, double> values;
   for (std::sregex_iterator chain(text.begin(), text.end(), kChain), end; chain != end; ++chain) {

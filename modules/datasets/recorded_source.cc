@@ -54,9 +54,8 @@ void RecordedSource::ChooseFrames(const SourceOptions& options) {
   end_ = options.last_frame < 0 ? num_frames : options.last_frame;
   next_ = first_;
   if (first_ < 0 || first_ >= end_ || end_ > num_frames) {
-    throw InputError("frames " + std::to_string(first_) + ":" + std::to_string(end_) + " are not in " +
-                     options.source + ", which has frames 0:" + std::to_string(num_frames) +
-                     ": choose a range within");
+    throw InputError("frames " + std::to_string(first_) + ":" + std::to_string(end_) + " are not in " + options.source +
+                     ", which has frames 0:" + std::to_string(num_frames) + ": choose a range within");
   }
 }
 
@@ -65,9 +64,8 @@ void RecordedSource::CheckTimes() const {
   for (size_t i = 1; i < utimes.size(); ++i) {
     if (utimes[i] <= utimes[i - 1]) {
       throw InputError("file " + recording_.times_path + ": the time of frame " + std::to_string(i) + " (" +
-                       std::to_string(utimes[i]) + " us) is not after that of frame " +
-                       std::to_string(i - 1) + " (" + std::to_string(utimes[i - 1]) +
-                       " us): repair the file");
+                       std::to_string(utimes[i]) + " us) is not after that of frame " + std::to_string(i - 1) + " (" +
+                       std::to_string(utimes[i - 1]) + " us): repair the file");
     }
   }
 }
@@ -85,8 +83,8 @@ void RecordedSource::PrepareRectifier(const SourceOptions& options) {
     }
   }
   if (const std::string problem = rig.Check(sensor_); !problem.empty()) {
-    throw InputError("the calibration of " + options.source + " does not do for --sensor " +
-                     ToString(sensor_) + ": " + problem);
+    throw InputError("the calibration of " + options.source + " does not do for --sensor " + ToString(sensor_) + ": " +
+                     problem);
   }
   RequireSize(first_left_.width, first_left_.height, rig.left.width_px, rig.left.height_px,
               "image " + recording_.left->Name(first_));
@@ -126,8 +124,7 @@ GrayImage RecordedSource::ReadRight(int64_t index) {
 DepthImage RecordedSource::ReadDepth(int64_t index) {
   const std::string& path = recording_.depth_paths.at(static_cast<size_t>(index));
   DepthImage image = ReadDepthImage(path);
-  RequireSize(image.width, image.height, calibration().width_px, calibration().height_px,
-              "depth image " + path);
+  RequireSize(image.width, image.height, calibration().width_px, calibration().height_px, "depth image " + path);
   return rectifier_->Depth(std::move(image));
 }
 

@@ -10,8 +10,7 @@ namespace tessera {
 namespace {
 
 cv::Mat CameraMatrix(const PinholeCamera& camera) {
-  return (cv::Mat_<double>(3, 3) << camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0,
-          0.0, 1.0);
+  return (cv::Mat_<double>(3, 3) << camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0);
 }
 
 Eigen::Matrix3d ToEigen(const cv::Mat& matrix) {
@@ -108,11 +107,9 @@ Rectifier::~Rectifier() = default;
 
 void Rectifier::PrepareSingle(const CameraRig& rig) {
   const cv::Size size(rig.left.width_px, rig.left.height_px);
-  cv::Mat matrix =
-      cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
+  cv::Mat matrix = cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
   // OpenCV would squeeze the two directions differently; features rely on patches that turn and scale evenly.
-  const double scale =
-      std::max(matrix.at<double>(0, 0) / rig.left.fx_px, matrix.at<double>(1, 1) / rig.left.fy_px);
+  const double scale = std::max(matrix.at<double>(0, 0) / rig.left.fx_px, matrix.at<double>(1, 1) / rig.left.fy_px);
   matrix.at<double>(0, 0) = scale * rig.left.fx_px;
   matrix.at<double>(1, 1) = scale * rig.left.fy_px;
   for (int step = 0; step < kMaxZoomSteps && !SeesOnlyImage(rig.left, cv::Mat(), matrix); ++step) {
@@ -124,8 +121,8 @@ void Rectifier::PrepareSingle(const CameraRig& rig) {
   calibration_.cy_px = matrix.at<double>(1, 2);
   maps_ = std::make_unique<Maps>();
   maps_->left = RemapTable(rig.left, cv::Mat(), matrix);
-  cv::convertMaps(maps_->left.whole, maps_->left.fraction, maps_->nearest.whole, maps_->nearest.fraction,
-                  CV_16SC2, true);
+  cv::convertMaps(maps_->left.whole, maps_->left.fraction, maps_->nearest.whole, maps_->nearest.fraction, CV_16SC2,
+                  true);
 }
 
 // P_left = [f 0 cx 0; 0 f cy 0; 0 0 1 0],  P_right = the same with -f * baseline [px m] at the top right.
@@ -141,13 +138,11 @@ void Rectifier::PreparePair(const CameraRig& rig) {
   }
   const cv::Size size(rig.left.width_px, rig.left.height_px);
   cv::Mat rectified_from_left, rectified_from_right, left_projection, right_projection, unused;
-  cv::stereoRectify(CameraMatrix(rig.left), rig.left.distortion, CameraMatrix(*rig.right),
-                    rig.right->distortion, size, cv_rotation, cv_translation, rectified_from_left,
-                    rectified_from_right, left_projection, right_projection, unused, cv::CALIB_ZERO_DISPARITY,
-                    0.0, size);
-  for (int step = 0;
-       step < kMaxZoomSteps && !(SeesOnlyImage(rig.left, rectified_from_left, left_projection) &&
-                                 SeesOnlyImage(*rig.right, rectified_from_right, right_projection));
+  cv::stereoRectify(CameraMatrix(rig.left), rig.left.distortion, CameraMatrix(*rig.right), rig.right->distortion, size,
+                    cv_rotation, cv_translation, rectified_from_left, rectified_from_right, left_projection,
+                    right_projection, unused, cv::CALIB_ZERO_DISPARITY, 0.0, size);
+  for (int step = 0; step < kMaxZoomSteps && !(SeesOnlyImage(rig.left, rectified_from_left, left_projection) &&
+                                               SeesOnlyImage(*rig.right, rectified_from_right, right_projection));
        ++step) {
     ZoomIn(left_projection);
     ZoomIn(right_projection);
@@ -162,8 +157,7 @@ void Rectifier::PreparePair(const CameraRig& rig) {
         "the right camera of the pair stands to the left of the left one, or above or below it: "
         "check the extrinsics in the calibration, or exchange the cameras");
   }
-  left_from_rectified_ =
-      Rigid3::FromMatrix(ToEigen(rectified_from_left).transpose(), Eigen::Vector3d::Zero());
+  left_from_rectified_ = Rigid3::FromMatrix(ToEigen(rectified_from_left).transpose(), Eigen::Vector3d::Zero());
   maps_ = std::make_unique<Maps>();
   maps_->left = RemapTable(rig.left, rectified_from_left, left_projection);
   maps_->right = RemapTable(*rig.right, rectified_from_right, right_projection);

@@ -13,10 +13,12 @@ class SimulatedSource : public FrameSource {
   SimulatedSource(const std::string& name, const SourceOptions& options)
       : simulation_(ParseSimulation(name), options.sensor),
         next_{options.first_frame},
-        end_(options.last_frame < 0 ? simulation_.num_frames() : std::min(options.last_frame, simulation_.num_frames())) {
+        end_(options.last_frame < 0 ? simulation_.num_frames()
+                                    : std::min(options.last_frame, simulation_.num_frames())) {
     if (next_.value >= end_) {
-      throw InputError("sim:" + name + " has " + std::to_string(simulation_.num_frames()) + " frames; none of them is in " +
-                       std::to_string(options.first_frame) + ":" + std::to_string(options.last_frame));
+      throw InputError("sim:" + name + " has " + std::to_string(simulation_.num_frames()) +
+                       " frames; none of them is in " + std::to_string(options.first_frame) + ":" +
+                       std::to_string(options.last_frame));
     }
     for (FrameId frame = next_; frame.value < end_; ++frame.value) {
       ground_truth_.push_back({frame, simulation_.UtimeOf(frame), simulation_.WorldFromCamera(frame)});

@@ -47,14 +47,10 @@ class StreamSource : public FrameSource {
 };
 
 StreamSource::StreamSource(VideoInput video, CameraRig rig, const SourceOptions& options, bool is_live)
-    : name_(options.source),
-      video_(std::move(video)),
-      is_live_(is_live),
-      frames_per_s_(video_.frames_per_s()) {
+    : name_(options.source), video_(std::move(video)), is_live_(is_live), frames_per_s_(video_.frames_per_s()) {
   if (frames_per_s_ == 0.0) {
     frames_per_s_ = kAssumedFramesPerS;
-    notes_.push_back("Warning: " + name_ +
-                     " does not tell its frame rate; 30 frames per second are assumed.");
+    notes_.push_back("Warning: " + name_ + " does not tell its frame rate; 30 frames per second are assumed.");
   }
   ChooseFrames(options);
   first_image_ = video_.Read();
@@ -76,14 +72,14 @@ void StreamSource::ChooseFrames(const SourceOptions& options) {
   end_ = options.last_frame < 0 && num_images > 0 ? num_images : options.last_frame;
   const bool is_empty = end_ >= 0 && first_ >= end_;
   if (first_ < 0 || is_empty || (num_images > 0 && end_ > num_images)) {
-    throw InputError("frames " + std::to_string(first_) + ":" + std::to_string(end_) + " are not in " +
-                     name_ + (num_images > 0 ? ", which has frames 0:" + std::to_string(num_images) : "") +
+    throw InputError("frames " + std::to_string(first_) + ":" + std::to_string(end_) + " are not in " + name_ +
+                     (num_images > 0 ? ", which has frames 0:" + std::to_string(num_images) : "") +
                      ": choose a range within");
   }
   for (; next_ < first_; ++next_) {
     if (!video_.Skip()) {
-      throw InputError(name_ + " ends at frame " + std::to_string(next_) + ", before frame " +
-                       std::to_string(first_) + ": choose an earlier range");
+      throw InputError(name_ + " ends at frame " + std::to_string(next_) + ", before frame " + std::to_string(first_) +
+                       ": choose an earlier range");
     }
   }
 }
@@ -130,16 +126,15 @@ std::optional<CameraFrame> StreamSource::Next() {
 
 void RequireMono(const SourceOptions& options) {
   if (options.sensor != SensorType::kMono) {
-    throw InputError(options.source + " has one image at a time and can't serve --sensor " +
-                     ToString(options.sensor) + ": use --sensor mono");
+    throw InputError(options.source + " has one image at a time and can't serve --sensor " + ToString(options.sensor) +
+                     ": use --sensor mono");
   }
 }
 
 CameraRig RequireCalibration(const SourceOptions& options) {
   if (options.calibration_path.empty()) {
-    throw InputError(
-        options.source +
-        " brings no calibration: give --camera FILE.yaml (config/cameras/example.yaml shows how)");
+    throw InputError(options.source +
+                     " brings no calibration: give --camera FILE.yaml (config/cameras/example.yaml shows how)");
   }
   return LoadCalibrationFile(options.calibration_path);
 }
@@ -154,11 +149,11 @@ std::unique_ptr<FrameSource> OpenVideoFile(const std::string& path, const Source
   if (options.calibration_path.empty() && fs::is_regular_file(beside)) {
     with_calibration.calibration_path = beside;
   } else if (options.calibration_path.empty()) {
-    throw InputError(options.source + " brings no calibration: give --camera FILE.yaml or put " +
-                     beside.string() + " there (config/cameras/example.yaml shows how)");
+    throw InputError(options.source + " brings no calibration: give --camera FILE.yaml or put " + beside.string() +
+                     " there (config/cameras/example.yaml shows how)");
   }
-  return std::make_unique<StreamSource>(std::move(video), RequireCalibration(with_calibration),
-                                        with_calibration, false);
+  return std::make_unique<StreamSource>(std::move(video), RequireCalibration(with_calibration), with_calibration,
+                                        false);
 }
 
 std::unique_ptr<FrameSource> OpenDevice(const std::string& index, const SourceOptions& options) {

@@ -43,16 +43,14 @@ std::vector<TimedFile> ReadFileTable(const fs::path& folder, const std::string& 
     }
     files.push_back({utime_us, path});
   }
-  std::stable_sort(files.begin(), files.end(),
-                   [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
+  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
   return files;
 }
 
 // Index of the file nearest in time (the earlier of two as near) in the non-empty, ordered list.
 size_t Nearest(const std::vector<TimedFile>& files, int64_t utime_us) {
-  const auto after =
-      std::lower_bound(files.begin(), files.end(), utime_us,
-                       [](const TimedFile& file, int64_t time) { return file.utime_us < time; });
+  const auto after = std::lower_bound(files.begin(), files.end(), utime_us,
+                                      [](const TimedFile& file, int64_t time) { return file.utime_us < time; });
   if (after == files.begin()) {
     return 0;
   }
@@ -114,8 +112,7 @@ std::string FindReadme(const fs::path& folder) {
 
 std::string Describe(const PinholeCamera& camera) {
   std::ostringstream text;
-  text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px
-       << " px";
+  text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px << " px";
   return text.str();
 }
 
@@ -137,11 +134,9 @@ void CalibrateFromFolder(const fs::path& folder, const SourceOptions& options, R
     rig.left = *camera;
     recording.notes.push_back("The calibration is taken from " + readme + ": " + Describe(rig.left) + ".");
   } else {
-    rig.left = {
-        .width_px = 640, .height_px = 480, .fx_px = 525.0, .fy_px = 525.0, .cx_px = 319.5, .cy_px = 239.5};
-    recording.notes.push_back(
-        "Warning: " + folder.string() + " says nothing of its camera; " + Describe(rig.left) +
-        " is assumed, as for any Kinect: give --camera FILE.yaml or put calibration.yaml there.");
+    rig.left = {.width_px = 640, .height_px = 480, .fx_px = 525.0, .fy_px = 525.0, .cx_px = 319.5, .cy_px = 239.5};
+    recording.notes.push_back("Warning: " + folder.string() + " says nothing of its camera; " + Describe(rig.left) +
+                              " is assumed, as for any Kinect: give --camera FILE.yaml or put calibration.yaml there.");
   }
   if (options.sensor != SensorType::kRgbd || rig.depth_unit_m > 0.0 || options.depth_unit_m > 0.0) {
     return;

@@ -25,8 +25,7 @@ VideoInput VideoInput::OpenFile(const std::string& path) {
   }
   auto impl = std::make_unique<Impl>();
   if (!impl->capture.open(path)) {
-    throw InputError("video " + path +
-                     " can't be opened: it is damaged or of a format that OpenCV does not read");
+    throw InputError("video " + path + " can't be opened: it is damaged or of a format that OpenCV does not read");
   }
   return VideoInput(std::move(impl));
 }

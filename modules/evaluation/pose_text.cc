@@ -11,8 +11,7 @@ std::string SecondsText(int64_t utime_us) {
   char text[40];
   const char* sign = utime_us < 0 ? "-" : "";
   const int64_t magnitude = utime_us < 0 ? -utime_us : utime_us;
-  std::snprintf(text, sizeof text, "%s%" PRId64 ".%06" PRId64, sign, magnitude / 1'000'000,
-                magnitude % 1'000'000);
+  std::snprintf(text, sizeof text, "%s%" PRId64 ".%06" PRId64, sign, magnitude / 1'000'000, magnitude % 1'000'000);
   return text;
 }
 

@@ -103,8 +103,8 @@ std::string FramesCsv(const RunRecord& record) {
   for (const FrameRecord& frame : record.Frames()) {
     const PoseEstimate& pose = frame.pose;
     char row[256];
-    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%s,%d,%d,%d,%d,%d,%" PRId64 "\n",
-                  pose.frame.value, pose.utime_us, StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
+    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%s,%d,%d,%d,%d,%d,%" PRId64 "\n", pose.frame.value,
+                  pose.utime_us, StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
                   MillisecondsText(frame.latency_ms).c_str(), MillisecondsText(frame.map_wait_ms).c_str(),
                   pose.num_features, pose.num_matches, pose.num_inliers, pose.num_landmarks, pose.is_keyframe ? 1 : 0,
                   pose.num_deltas);

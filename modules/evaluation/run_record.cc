@@ -8,8 +8,8 @@ namespace tessera {
 namespace {
 
 void AddPoseBits(const Rigid3& pose, Sha256& hash) {
-  for (const double number : {pose.translation.x(), pose.translation.y(), pose.translation.z(),
-                              pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.rotation.w()}) {
+  for (const double number : {pose.translation.x(), pose.translation.y(), pose.translation.z(), pose.rotation.x(),
+                              pose.rotation.y(), pose.rotation.z(), pose.rotation.w()}) {
     hash.Add(number);
   }
 }
@@ -90,7 +90,8 @@ FrameCounts RunRecord::Counts() const {
 StampedPose RunRecord::FinalPose(const PoseEstimate& estimate) const {
   const std::optional<Sim3> world_from_reference = removed_.Find(map_, estimate.reference_keyframe);
   return {estimate.frame, estimate.utime_us,
-          world_from_reference ? (*world_from_reference * estimate.reference_from_camera).Pose() : estimate.world_from_camera};
+          world_from_reference ? (*world_from_reference * estimate.reference_from_camera).Pose()
+                               : estimate.world_from_camera};
 }
 
 std::vector<StampedPose> RunRecord::Trajectory() const {

@@ -14,7 +14,7 @@
 #include "geometry/rigid3.h"
 #include "map/map.h"
 #include "map/removed_keyframes.h"
-#include "map/tracking_types.h"
+#include "messages/tracking_types.h"
 
 namespace tessera {
 
@@ -29,8 +29,8 @@ struct FrameRecord {
   PoseEstimate pose;
   int64_t publish_us = 0;              // wall clock at which the pose was published
   std::optional<double> pose_time_ms;  // since the pose before it was published; none for the first
-  std::optional<double> latency_ms;  // since the dispatcher first heard of the frame; none if that is unknown
-  std::optional<double> map_wait_ms;  // how long it waited in the tracker for changes of the map
+  std::optional<double> latency_ms;    // since the dispatcher first heard of the frame; none if that is unknown
+  std::optional<double> map_wait_ms;   // how long it waited in the tracker for changes of the map
 };
 
 struct FrameCounts {
@@ -46,9 +46,9 @@ struct FrameCounts {
 // What a stage said last of its own work.
 struct StageFigures {
   Statistics step_ms;
-  int64_t num_repaired = 0;  // messages
-  int64_t num_lost = 0;      // messages
-  int64_t num_dropped = 0;   // frames
+  int64_t num_repaired = 0;              // messages
+  int64_t num_lost = 0;                  // messages
+  int64_t num_dropped = 0;               // frames
   std::map<std::string, double> values;  // what else it counts, by name
 };
 

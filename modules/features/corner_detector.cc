@@ -19,9 +19,10 @@ constexpr int kLanes = 32;
 // Offsets of the ring of 16 pixels at distance 3, in order around it.
 struct Ring {
   explicit Ring(ptrdiff_t stride)
-      : offsets{3 * stride,      3 * stride + 1,  2 * stride + 2,  stride + 3,  3,  -stride + 3, -2 * stride + 2,
-                -3 * stride + 1, -3 * stride,     -3 * stride - 1, -2 * stride - 2, -stride - 3, -3, stride - 3,
-                2 * stride - 2,  3 * stride - 1} {}
+      : offsets{3 * stride,  3 * stride + 1,  2 * stride + 2,  stride + 3,
+                3,           -stride + 3,     -2 * stride + 2, -3 * stride + 1,
+                -3 * stride, -3 * stride - 1, -2 * stride - 2, -stride - 3,
+                -3,          stride - 3,      2 * stride - 2,  3 * stride - 1} {}
   ptrdiff_t offsets[16];
 };
 

@@ -18,8 +18,8 @@ class CornerDetector {
   // score(p): the largest threshold t for which p is a corner, i.e. nine neighbouring pixels of the ring of 16 are all
   // brighter than p + t, or all darker than p - t.
   //
-  // Between the pixels the corner stands where the parabola through the scores of three neighbours of a row or column has
-  // its maximum; scores below min_score count as min_score - 1.
+  // Between the pixels the corner stands where the parabola through the scores of three neighbours of a row or column
+  // has its maximum; scores below min_score count as min_score - 1.
   //
   // A corner counts if its score is at least min_score and the highest among its eight neighbours; of equal neighbours
   // the first in reading order counts. Within a cell, a higher score is better, then the first in reading order.

@@ -46,10 +46,10 @@ constexpr std::array<uint16_t, 16> kOddColumns = MakeColumns(1);
 
 // round(2^22 tan((k + 1/2) / 256 turn)), k = 0 .. 31: the bounds between neighbouring angles of the first octant.
 constexpr int kTangentBits = 22;  // AngleOf's numbers have 40 bits at most, so products fit 63
-constexpr std::array<int64_t, 32> kTangents = {
-    51474, 154485, 257683, 361192, 465140, 569655, 674869, 780918, 887941, 996082, 1105491, 1216326, 1328749, 1442935,
-    1559067, 1677337, 1797952, 1921133, 2047115, 2176153, 2308520, 2444513, 2584454, 2728694, 2877616, 3031640,
-    3191228, 3356892, 3529196, 3708768, 3896309, 4092603};
+constexpr std::array<int64_t, 32> kTangents = {51474,   154485,  257683,  361192,  465140,  569655,  674869,  780918,
+                                               887941,  996082,  1105491, 1216326, 1328749, 1442935, 1559067, 1677337,
+                                               1797952, 1921133, 2047115, 2176153, 2308520, 2444513, 2584454, 2728694,
+                                               2877616, 3031640, 3191228, 3356892, 3529196, 3708768, 3896309, 4092603};
 
 }  // namespace
 
@@ -57,9 +57,8 @@ uint8_t AngleOf(int64_t x, int64_t y) {
   const int64_t larger = std::max(std::abs(x), std::abs(y));
   const int64_t smaller = std::min(std::abs(x), std::abs(y));
   if (larger == 0) return 0;
-  const auto bound = std::partition_point(kTangents.begin(), kTangents.end(), [&](int64_t tangent) {
-    return tangent * larger <= smaller << kTangentBits;
-  });
+  const auto bound = std::partition_point(kTangents.begin(), kTangents.end(),
+                                          [&](int64_t tangent) { return tangent * larger <= smaller << kTangentBits; });
   auto angle = static_cast<int>(bound - kTangents.begin());
   if (std::abs(y) > std::abs(x)) angle = 64 - angle;
   if (x < 0) angle = 128 - angle;
@@ -100,7 +99,7 @@ uint8_t Orientation(const LevelImage& image, int x, int y) {
 
 Descriptor Describe(const LevelImage& smoothed, int x, int y, uint8_t angle) {
   // A copy of the patch with a fixed stride makes the turned offsets constants.
-  std::array<uint8_t, kPatternStride*(2 * kRadius + 1)> patch;
+  std::array<uint8_t, kPatternStride * (2 * kRadius + 1)> patch;
   const uint8_t* in = smoothed.At(x - kRadius, y - kRadius);
   for (int row = 0; row <= 2 * kRadius; ++row) {
     simd::Store(patch.data() + row * kPatternStride, Load8(in + row * smoothed.stride()));

@@ -18,8 +18,8 @@ uint8_t Orientation(const LevelImage& image, int x, int y);
 // atan2(y, x) in 1/256 turn, rounded to nearest; 0 for (0, 0). Both within +-2^40.
 uint8_t AngleOf(int64_t x, int64_t y);
 
-// 256 tests I(p) < I(q) on the doubly smoothed image (smoother.h), at the point pairs of the pattern turned by the angle
-// (rounded to 1/64 turn, positions rounded to pixels). The image must hold kPatchRadiusPx around (x, y).
+// 256 tests I(p) < I(q) on the doubly smoothed image (smoother.h), at the point pairs of the pattern turned by the
+// angle (rounded to 1/64 turn, positions rounded to pixels). The image must hold kPatchRadiusPx around (x, y).
 Descriptor Describe(const LevelImage& smoothed, int x, int y, uint8_t angle);
 
 }  // namespace tessera

@@ -16,7 +16,8 @@ float DepthAt(const TileJob& job, const Candidate& candidate) {
 }
 
 Rect Grow(const Rect& rect, int margin) {
-  return {.x = rect.x - margin, .y = rect.y - margin, .width = rect.width + 2 * margin, .height = rect.height + 2 * margin};
+  return {
+      .x = rect.x - margin, .y = rect.y - margin, .width = rect.width + 2 * margin, .height = rect.height + 2 * margin};
 }
 
 bool IsWholeImage(const TileJob& job) {
@@ -101,8 +102,8 @@ void Extractor::DescribeCandidates(TileFeatures& features) {
 void Extractor::MatchCandidates(const FeatureOptions& options) {
   for (Candidate& candidate : candidates_) {
     const auto level = static_cast<size_t>(candidate.level);
-    const std::optional<int> right_x = matcher_.Match(left_[level], right_[level], candidate.x, candidate.y,
-                                                      LevelDisparity(options, candidate.level));
+    const std::optional<int> right_x =
+        matcher_.Match(left_[level], right_[level], candidate.x, candidate.y, LevelDisparity(options, candidate.level));
     if (!right_x) continue;
     // The disparity is that of the pixel; the corner beside it is seen as far beside in both images.
     const double corner_x = static_cast<double>(*right_x) / StereoMatcher::kSubpixels +

@@ -18,9 +18,9 @@ namespace tessera {
 // allocated. One thread at a time may use it; any number of extractors may work side by side.
 class Extractor {
  public:
-  // The candidates of the job's tile, a pure function of the job: whatever the cut, the candidates of all tiles together
-  // are those of the whole image, up to such as SelectFeatures would not take anyway. Throws std::invalid_argument with
-  // CheckTileJob's sentence if the job is malformed.
+  // The candidates of the job's tile, a pure function of the job: whatever the cut, the candidates of all tiles
+  // together are those of the whole image, up to such as SelectFeatures would not take anyway. Throws
+  // std::invalid_argument with CheckTileJob's sentence if the job is malformed.
   TileFeatures Extract(const TileJob& job);
 
  private:

@@ -63,7 +63,8 @@ struct FeatureFrame {
 
 // One unit of work: detect and describe the candidates of one tile, over a range of pyramid levels.
 struct TileJob {
-  int64_t run = 0;  // start of the reassembler that awaits the answer: copied into it, so that it is known as this run's
+  int64_t run =
+      0;  // start of the reassembler that awaits the answer: copied into it, so that it is known as this run's
   FrameId frame;
   FrameId previous_frame;  // the frame before it that was not dropped; invalid: it is the first
   int64_t utime_us = 0;
@@ -91,12 +92,12 @@ inline constexpr int kCornerSubpixels = 64;
 struct Candidate {
   int16_t x = 0;  // pixel of its pyramid level, in coordinates of the whole level image
   int16_t y = 0;
-  int8_t offset_x = 0;      // from there to the corner, 1/kCornerSubpixels px of its level, half a pixel at most
+  int8_t offset_x = 0;  // from there to the corner, 1/kCornerSubpixels px of its level, half a pixel at most
   int8_t offset_y = 0;
   uint8_t level = 0;
-  uint8_t angle = 0;        // 1/256 turn
-  uint16_t score = 0;       // strength
-  float right_x_px = -1.0F; // as in Keypoint
+  uint8_t angle = 0;         // 1/256 turn
+  uint16_t score = 0;        // strength
+  float right_x_px = -1.0F;  // as in Keypoint
   float depth_m = 0.0F;
 
   bool operator==(const Candidate&) const = default;

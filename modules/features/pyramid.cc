@@ -9,9 +9,9 @@
 namespace tessera {
 namespace {
 
-constexpr std::array<int64_t, 13> kPowersOf5 = {1,      5,       25,      125,      625,       3125,     15625,
-                                                78125,  390625,  1953125, 9765625,  48828125,  244140625};
-constexpr std::array<int64_t, 13> kPowersOf6 = {1,      6,       36,       216,      1296,      7776,     46656,
+constexpr std::array<int64_t, 13> kPowersOf5 = {1,     5,      25,      125,     625,      3125,     15625,
+                                                78125, 390625, 1953125, 9765625, 48828125, 244140625};
+constexpr std::array<int64_t, 13> kPowersOf6 = {1,      6,       36,       216,      1296,      7776,      46656,
                                                 279936, 1679616, 10077696, 60466176, 362797056, 2176782336};
 
 // One chunk of a row: 80 output pixels from 96 input pixels, as 5 vector operations of 2 x 8 output pixels, 40 apart.
@@ -47,7 +47,8 @@ constexpr ReduceTable MakeReduceTable() {
 
 constexpr ReduceTable kReduceTable = MakeReduceTable();
 
-// out = (above * (10 - tenths) + below * tenths + 50) / 100, for rows in tenths; v / 100 = v * 5243 / 2^19 for v < 43698.
+// out = (above * (10 - tenths) + below * tenths + 50) / 100, for rows in tenths; v / 100 = v * 5243 / 2^19 for v <
+// 43698.
 void CombineRows(const uint16_t* above, const uint16_t* below, int tenths, int width, uint8_t* out) {
   const simd::U16x16 weight_above = simd::Fill16(static_cast<uint16_t>(10 - tenths));
   const simd::U16x16 weight_below = simd::Fill16(static_cast<uint16_t>(tenths));
@@ -116,8 +117,7 @@ const uint16_t* PyramidReducer::HorizontalRow(const LevelImage& below, int y) {
       const auto i = static_cast<size_t>(operation);
       const uint8_t* source = in + SourcePixel(8 * operation);
       simd::WeightedPairs(source, source + kChunkInput / 2, kReduceTable.pairs[i].data(),
-                          kReduceTable.weights[i].data(), out + 8 * operation,
-                          out + 8 * operation + kChunkOutput / 2);
+                          kReduceTable.weights[i].data(), out + 8 * operation, out + 8 * operation + kChunkOutput / 2);
     }
   }
   return rows_[slot].data();

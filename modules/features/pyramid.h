@@ -1,8 +1,8 @@
 // The image pyramid, defined on the coordinates of the whole image, so that any part of a level can be computed from
 // the part of the image below it with the same bits as from all of it.
 //
-// A pixel x of level l + 1 is sampled at   1.2 (x + 1/2) - 1/2 = 1.2 x + 0.1   of level l. Five pixels cover six, so the
-// bilinear weights are exact tenths that repeat: (9,1) (7,3) (5,5) (3,7) (1,9); both directions together give
+// A pixel x of level l + 1 is sampled at   1.2 (x + 1/2) - 1/2 = 1.2 x + 0.1   of level l. Five pixels cover six, so
+// the bilinear weights are exact tenths that repeat: (9,1) (7,3) (5,5) (3,7) (1,9); both directions together give
 // hundredths, rounded once. A keypoint x of level l stands at   1.2^l (x + 1/2) - 1/2   of the image.
 #pragma once
 
@@ -82,7 +82,7 @@ class PyramidReducer {
 
   int first_x_ = 0;  // of the output, a multiple of 5
   int num_chunks_ = 0;
-  int rows_y_[2] = {0, 0};        // the rows of the level below ...
+  int rows_y_[2] = {0, 0};         // the rows of the level below ...
   std::vector<uint16_t> rows_[2];  // ... that are held here, reduced horizontally, in tenths
 };
 

@@ -29,7 +29,9 @@ uint32_t RankWeight(uint32_t rank) {
   return (kHalfWeightRank << 12U) / (kHalfWeightRank + rank);
 }
 
-bool IsBefore(const Entry& a, const Entry& b) { return std::tie(a.level, a.y, a.x, a.index) < std::tie(b.level, b.y, b.x, b.index); }
+bool IsBefore(const Entry& a, const Entry& b) {
+  return std::tie(a.level, a.y, a.x, a.index) < std::tie(b.level, b.y, b.x, b.index);
+}
 bool IsSamePlace(const Entry& a, const Entry& b) { return a.level == b.level && a.y == b.y && a.x == b.x; }
 
 uint32_t CellOf(const CameraCalibration& calibration, const Candidate& candidate) {
@@ -69,7 +71,8 @@ void WeighByRank(std::span<Entry> level) {
 }
 
 // How many of each level are taken.
-std::array<size_t, kMaxLevels> ShareOut(const FeatureOptions& options, const std::array<size_t, kMaxLevels>& available) {
+std::array<size_t, kMaxLevels> ShareOut(const FeatureOptions& options,
+                                        const std::array<size_t, kMaxLevels>& available) {
   const std::array<int, kMaxLevels> quotas = LevelQuotas(options);
   std::array<size_t, kMaxLevels> taken{};
   auto rest = static_cast<size_t>(options.num_features);
@@ -89,10 +92,9 @@ std::array<size_t, kMaxLevels> ShareOut(const FeatureOptions& options, const std
 void PutBestFirst(std::span<Entry> level, size_t count) {
   if (count >= level.size()) return;
   WeighByRank(level);
-  std::nth_element(level.begin(), level.begin() + static_cast<ptrdiff_t>(count), level.end(),
-                   [](const Entry& a, const Entry& b) {
-                     return std::tie(b.priority, a.y, a.x) < std::tie(a.priority, b.y, b.x);
-                   });
+  std::nth_element(
+      level.begin(), level.begin() + static_cast<ptrdiff_t>(count), level.end(),
+      [](const Entry& a, const Entry& b) { return std::tie(b.priority, a.y, a.x) < std::tie(a.priority, b.y, b.x); });
 }
 
 Keypoint MakeKeypoint(const Candidate& candidate) {
@@ -123,7 +125,8 @@ std::vector<uint32_t> ChooseCandidates(const CameraCalibration& calibration, con
   for (size_t level = 0; level < taken.size(); first += available[level], ++level) {
     const std::span<Entry> entries_of_level(entries.data() + first, available[level]);
     PutBestFirst(entries_of_level, taken[level]);
-    chosen.insert(chosen.end(), entries_of_level.begin(), entries_of_level.begin() + static_cast<ptrdiff_t>(taken[level]));
+    chosen.insert(chosen.end(), entries_of_level.begin(),
+                  entries_of_level.begin() + static_cast<ptrdiff_t>(taken[level]));
   }
   std::sort(chosen.begin(), chosen.end(), IsBefore);
   std::vector<uint32_t> indices;
@@ -182,7 +185,8 @@ std::string CheckTileFeatures(const TileFeatures& features) {
     if (2 * std::abs(candidate.offset_x) > kCornerSubpixels || 2 * std::abs(candidate.offset_y) > kCornerSubpixels) {
       return name + "a candidate's corner lies outside its pixel";
     }
-    if (!std::isfinite(candidate.right_x_px) || candidate.right_x_px >= static_cast<float>(features.calibration.width_px) ||
+    if (!std::isfinite(candidate.right_x_px) ||
+        candidate.right_x_px >= static_cast<float>(features.calibration.width_px) ||
         !std::isfinite(candidate.depth_m) || candidate.depth_m < 0.0F) {
       return name + "a candidate's right column or depth is out of range";
     }

@@ -60,9 +60,7 @@ inline U16x16 ShiftRight(U16x16 a) {
 inline U16x16 EvenBytes(U8x32 a) { return {_mm256_and_si256(a.v, _mm256_set1_epi16(0x00FF))}; }
 inline U16x16 OddBytes(U8x32 a) { return {_mm256_srli_epi16(a.v, 8)}; }
 // The sixteen values of a, then those of b, all <= 255.
-inline U8x32 Narrow(U16x16 a, U16x16 b) {
-  return {_mm256_permute4x64_epi64(_mm256_packus_epi16(a.v, b.v), 0xD8)};
-}
+inline U8x32 Narrow(U16x16 a, U16x16 b) { return {_mm256_permute4x64_epi64(_mm256_packus_epi16(a.v, b.v), 0xD8)}; }
 // Sum of the products of signed values; must fit 32 bits.
 inline int32_t SignedDot(U16x16 a, U16x16 b) {
   const __m256i products = _mm256_madd_epi16(a.v, b.v);
@@ -110,8 +108,7 @@ inline uint32_t GreaterMask(U8x32 a, U8x32 b) {
   const uint8x16_t bits = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
   const auto mask = [&bits](uint8x16_t x, uint8x16_t y) {
     const uint8x16_t set = vandq_u8(vcgtq_u8(x, y), bits);
-    return static_cast<uint32_t>(vaddv_u8(vget_low_u8(set))) |
-           static_cast<uint32_t>(vaddv_u8(vget_high_u8(set))) << 8;
+    return static_cast<uint32_t>(vaddv_u8(vget_low_u8(set))) | static_cast<uint32_t>(vaddv_u8(vget_high_u8(set))) << 8;
   };
   return mask(a.low, b.low) | mask(a.high, b.high) << 16;
 }

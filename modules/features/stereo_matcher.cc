@@ -62,7 +62,8 @@ void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right
   }
 }
 
-std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage& right, int x, int y, int max_disparity) {
+std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage& right, int x, int y,
+                                        int max_disparity) {
   // One place more at both ends lets the first and the last one have neighbours.
   const int first = std::max(x - max_disparity - 1, kRadius);
   const int count = x + 2 - first;
@@ -71,7 +72,9 @@ std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage
   const auto end = begin + count;
   const auto best = std::min_element(begin + 1, end - 1);
   if (*best > kMaxMeanCost * kWindow * kWindow) return std::nullopt;
-  const auto second = [&](auto from, auto to) { return from < to ? *std::min_element(from, to) : uint16_t{UINT16_MAX}; };
+  const auto second = [&](auto from, auto to) {
+    return from < to ? *std::min_element(from, to) : uint16_t{UINT16_MAX};
+  };
   const int other = std::min(second(begin, best - std::min<ptrdiff_t>(best - begin, kNeighbourhood)),
                              second(best + std::min<ptrdiff_t>(end - best, kNeighbourhood + 1), end));
   if (*best * kUniqueDenominator > other * kUniqueNumerator) return std::nullopt;

@@ -13,8 +13,8 @@ class StereoMatcher {
  public:
   static constexpr int kSubpixels = 64;  // positions are counted in 1/64 px
 
-  // Position of the pixel (x, y) of the left image in the right image, in 1/64 px of the level, at most max_disparity to
-  // the left of x; nullopt if no place matches well, or more than one does. Compares windows of 11 x 11 px by
+  // Position of the pixel (x, y) of the left image in the right image, in 1/64 px of the level, at most max_disparity
+  // to the left of x; nullopt if no place matches well, or more than one does. Compares windows of 11 x 11 px by
   //
   //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, y + j)|, 23),
   //

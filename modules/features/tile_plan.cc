@@ -77,8 +77,8 @@ bool TilePlan::HasCells() const {
   return std::any_of(levels.begin(), levels.end(), [](const LevelPlan& level) { return !level.corners.empty(); });
 }
 
-TilePlan PlanTile(const CameraCalibration& calibration, const FeatureOptions& options, const Rect& core, int first_level,
-                  int last_level) {
+TilePlan PlanTile(const CameraCalibration& calibration, const FeatureOptions& options, const Rect& core,
+                  int first_level, int last_level) {
   TilePlan plan;
   Interval depth_x;
   Interval depth_y;

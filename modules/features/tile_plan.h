@@ -1,4 +1,5 @@
-// Which cells a tile answers for, and which pixels it needs for that: the one place that dispatcher and extractor agree on.
+// Which cells a tile answers for, and which pixels it needs for that: the one place that dispatcher and extractor agree
+// on.
 //
 // Each level of the pyramid carries a fixed grid of cells over the pixels that are far enough from the image's border
 // to be described. A cell belongs to the tile whose core holds its centre (in level-0 coordinates). Rectangles are
@@ -28,7 +29,9 @@ inline constexpr int kStereoMarginPx = kStereoRadiusPx + 1;
 struct CellAxis {
   explicit CellAxis(int level_size_px) : level_size(level_size_px) {}
 
-  int num_cells() const { return level_size > 2 * kBorderPx ? (level_size - 2 * kBorderPx + kCellPx - 1) / kCellPx : 0; }
+  int num_cells() const {
+    return level_size > 2 * kBorderPx ? (level_size - 2 * kBorderPx + kCellPx - 1) / kCellPx : 0;
+  }
   // Pixels of cells first .. last - 1; the last cell of the grid may be narrower.
   Interval Pixels(Interval cells) const;
   // Cells whose centre lies in `core`, level-0 pixels.
@@ -41,13 +44,13 @@ struct CellAxis {
 int LevelDisparity(const FeatureOptions& options, int level);
 
 struct LevelPlan {
-  int width = 0;          // of the whole level, px
+  int width = 0;  // of the whole level, px
   int height = 0;
   Interval cell_columns;  // the cells that the tile answers for
   Interval cell_rows;
-  Rect corners;           // their pixels
-  Rect left;              // pixels of the level that are needed for them and for the levels above
-  Rect right;             // stereo: likewise of the right image
+  Rect corners;  // their pixels
+  Rect left;     // pixels of the level that are needed for them and for the levels above
+  Rect right;    // stereo: likewise of the right image
 };
 
 struct TilePlan {
@@ -58,10 +61,11 @@ struct TilePlan {
 };
 
 // `core` is a level-0 rectangle inside the image; the levels must be in range of the options.
-TilePlan PlanTile(const CameraCalibration& calibration, const FeatureOptions& options, const Rect& core, int first_level,
-                  int last_level);
+TilePlan PlanTile(const CameraCalibration& calibration, const FeatureOptions& options, const Rect& core,
+                  int first_level, int last_level);
 
-// How many of the num_features keypoints each level gets: in proportion to (5/6)^level, as in ORB-SLAM (Mur-Artal 2015).
+// How many of the num_features keypoints each level gets: in proportion to (5/6)^level, as in ORB-SLAM (Mur-Artal
+// 2015).
 std::array<int, kMaxLevels> LevelQuotas(const FeatureOptions& options);
 
 // How many candidates a cell of this level may yield.

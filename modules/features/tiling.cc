@@ -30,8 +30,8 @@ bool HasSize(const Image<Pixel>& image, int width, int height) {
 
 // Empty, or what is wrong with the pixels of one image of a job.
 template <class Pixel>
-std::string CheckPart(const char* name, const CameraCalibration& calibration, const Rect& rect, const Image<Pixel>& image,
-                      const Rect& needed) {
+std::string CheckPart(const char* name, const CameraCalibration& calibration, const Rect& rect,
+                      const Image<Pixel>& image, const Rect& needed) {
   if (!LiesWithin(rect, calibration)) return std::string("the ") + name + " rectangle leaves the image";
   if (!HasSize(image, rect.width, rect.height)) {
     return std::string("the ") + name + " pixels are not as many as the rectangle's";

@@ -24,9 +24,9 @@ TileGrid ParseTileGrid(const std::string& text);
 
 // The jobs of one frame, num_tiles of them, in the order in which they are best given out.
 //
-// A 1x1 grid makes one job with all levels of the pyramid. Otherwise a first job, the longest, has the coarse levels from
-// `coarse_levels_from` up, of the whole image (their margins would be wide in level-0 pixels); then each tile of the grid,
-// line by line, has the levels below that. Tiles that have nothing to detect are left out.
+// A 1x1 grid makes one job with all levels of the pyramid. Otherwise a first job, the longest, has the coarse levels
+// from `coarse_levels_from` up, of the whole image (their margins would be wide in level-0 pixels); then each tile of
+// the grid, line by line, has the levels below that. Tiles that have nothing to detect are left out.
 //
 // arrival_us is copied into the jobs. Throws InputError if the options, the calibration or the sizes of the images are
 // wrong.

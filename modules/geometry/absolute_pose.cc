@@ -59,8 +59,8 @@ std::array<double, 5> GrunertQuartic(double a2, double b2, double c2, double cos
   const double a = a2 / b2, c = c2 / b2;
   return {(1.0 + p) * (1.0 + p) - 4.0 * a * cos_c * cos_c,
           4.0 * (-p * (1.0 + p) * cos_b + 2.0 * a * cos_c * cos_c * cos_b - (1.0 - q) * cos_a * cos_c),
-          2.0 * (p * p - 1.0 + 2.0 * p * p * cos_b * cos_b + 2.0 * r * cos_a * cos_a -
-                 4.0 * q * cos_a * cos_b * cos_c + 2.0 * s * cos_c * cos_c),
+          2.0 * (p * p - 1.0 + 2.0 * p * p * cos_b * cos_b + 2.0 * r * cos_a * cos_a - 4.0 * q * cos_a * cos_b * cos_c +
+                 2.0 * s * cos_c * cos_c),
           4.0 * (p * (1.0 - p) * cos_b - (1.0 - q) * cos_a * cos_c + 2.0 * c * cos_a * cos_a * cos_b),
           (p - 1.0) * (p - 1.0) - 4.0 * c * cos_a * cos_a};
 }
@@ -71,9 +71,8 @@ int CountInliers(const CameraCalibration& calibration, std::span<const PointPixe
   int num_inliers = 0;
   for (size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d in_camera = rotation * points[i].point_in_world + pose.translation;
-    const bool fits = in_camera.z() > 0.0 &&
-                      (calibration.Project(in_camera) - points[i].pixel_px).squaredNorm() <=
-                          Chi2Limit(false) * points[i].sigma_px * points[i].sigma_px;
+    const bool fits = in_camera.z() > 0.0 && (calibration.Project(in_camera) - points[i].pixel_px).squaredNorm() <=
+                                                 Chi2Limit(false) * points[i].sigma_px * points[i].sigma_px;
     is_inlier[i] = fits ? 1 : 0;
     num_inliers += fits ? 1 : 0;
   }

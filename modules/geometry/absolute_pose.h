@@ -20,7 +20,8 @@ struct PointPixel {
 };
 
 // Poses camera_from_world that put three points on three rays (Grunert 1841, in the form of Haralick et al. 1994):
-// up to four, fewer if some are complex or behind the camera, none if the points lie on a line. Rays need no unit length.
+// up to four, fewer if some are complex or behind the camera, none if the points lie on a line. Rays need no unit
+// length.
 std::vector<Rigid3> PosesFromThreePoints(const std::array<Eigen::Vector3d, 3>& points_in_world,
                                          const std::array<Eigen::Vector3d, 3>& rays_in_camera);
 

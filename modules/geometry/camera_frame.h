@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "core/ids.h"
 #include "core/image.h"
@@ -28,15 +27,6 @@ struct GroundTruthPose {
   FrameId frame;
   int64_t utime_us = 0;
   Rigid3 world_from_camera;  // metres; any world frame
-};
-
-// The stage `stage` has sent all it will ever send: the last frame of the stream is num_frames - 1 (the first need not
-// be 0: frames keep their source's numbers), and of all that came to it, it and those before it dropped some.
-struct EndOfStream {
-  std::string stage;
-  int64_t num_frames = 0;
-  int64_t num_dropped = 0;
-  int64_t num_values = 0;  // tracker: keyframes sent; mapper: deltas sent. Others wait for the last; the rest: 0
 };
 
 }  // namespace tessera

@@ -41,8 +41,7 @@ Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
 }
 
 // The motion one step of (rotation [rad], direction of translation [rad in its tangent plane]) away.
-Rigid3 StepMotion(const Rigid3& motion, const Eigen::Matrix<double, 3, 2>& basis,
-                  const Vector5d& step) {
+Rigid3 StepMotion(const Rigid3& motion, const Eigen::Matrix<double, 3, 2>& basis, const Vector5d& step) {
   const Eigen::Vector3d t = motion.translation + basis * step.tail<2>();
   return {(ExpSO3(step.head<3>()) * motion.rotation).normalized(), t.normalized()};
 }

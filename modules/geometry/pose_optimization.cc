@@ -20,10 +20,12 @@ struct NormalEquations {
 
 class PoseProblem {
  public:
-  PoseProblem(const CameraCalibration& calibration, double baseline_m,
-              std::span<const PoseObservation> observations)
-      : calibration_(calibration), baseline_m_(baseline_m), observations_(observations),
-        weights_(observations.size(), Eigen::Matrix3d::Identity()), is_inlier_(observations.size(), 1) {}
+  PoseProblem(const CameraCalibration& calibration, double baseline_m, std::span<const PoseObservation> observations)
+      : calibration_(calibration),
+        baseline_m_(baseline_m),
+        observations_(observations),
+        weights_(observations.size(), Eigen::Matrix3d::Identity()),
+        is_inlier_(observations.size(), 1) {}
 
   // W_i = (I + J_i C_i J_i')^-1 at this pose.
   void ComputeWeights(const Rigid3& camera_from_world);
@@ -52,8 +54,7 @@ void PoseProblem::ComputeWeights(const Rigid3& camera_from_world) {
       weights_[i].setIdentity();
       continue;
     }
-    const Eigen::Matrix3d by_world =
-        Reproject(calibration_, baseline_m_, point, observation.seen).by_point * rotation;
+    const Eigen::Matrix3d by_world = Reproject(calibration_, baseline_m_, point, observation.seen).by_point * rotation;
     const Eigen::Matrix3d spread =
         Eigen::Matrix3d::Identity() + by_world * observation.covariance * by_world.transpose();
     weights_[i] = spread.inverse();

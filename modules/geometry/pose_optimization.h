@@ -19,16 +19,16 @@ struct PoseObservation {
 };
 
 struct PoseOptimizationOptions {
-  int num_rounds = 4;       // after each, observations are sorted anew into inliers and outliers
-  int max_iterations = 5;   // Gauss-Newton steps a round; they converge in 2 to 4 from a fair start
-  double min_step = 1e-9;   // a smaller step (metres and radians, norm) ends the round
+  int num_rounds = 4;      // after each, observations are sorted anew into inliers and outliers
+  int max_iterations = 5;  // Gauss-Newton steps a round; they converge in 2 to 4 from a fair start
+  double min_step = 1e-9;  // a smaller step (metres and radians, norm) ends the round
 };
 
 struct PoseOptimizationResult {
   Rigid3 camera_from_world;
   std::vector<char> is_inlier;  // by observation: 1 if it agrees with the pose (chi-square, 95 %)
   int num_inliers = 0;
-  double rms = 0.0;             // of the inliers' whitened residuals; about 1 where sigma_px is true
+  double rms = 0.0;  // of the inliers' whitened residuals; about 1 where sigma_px is true
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();  // of Retract's tangent
 };
 

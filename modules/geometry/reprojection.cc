@@ -15,8 +15,8 @@ Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, doubl
           observation.has_right() ? weight * (u - disparity - observation.right_x_px) : 0.0};
 }
 
-Reprojection Reproject(const CameraCalibration& calibration, double baseline_m,
-                       const Eigen::Vector3d& point_in_camera, const PixelObservation& observation) {
+Reprojection Reproject(const CameraCalibration& calibration, double baseline_m, const Eigen::Vector3d& point_in_camera,
+                       const PixelObservation& observation) {
   Reprojection result;
   result.residual = ReprojectionResidual(calibration, baseline_m, point_in_camera, observation);
   // u = fx x/z + cx:                 du/dx = fx/z,  du/dz = -fx x/z^2

@@ -17,7 +17,7 @@ inline constexpr double kNoColumn = std::numeric_limits<double>::quiet_NaN();
 struct PixelObservation {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
   double right_x_px = kNoColumn;  // column in the right image, may lie outside of it; kNoColumn: not known
-  double sigma_px = 1.0;     // standard deviation of each coordinate
+  double sigma_px = 1.0;          // standard deviation of each coordinate
 
   bool has_right() const { return !std::isnan(right_x_px); }
 };
@@ -30,14 +30,15 @@ struct Reprojection {
 };
 
 // `point_in_camera` must have z > 0; baseline_m > 0 where the observation has a right column.
-Reprojection Reproject(const CameraCalibration& calibration, double baseline_m,
-                       const Eigen::Vector3d& point_in_camera, const PixelObservation& observation);
+Reprojection Reproject(const CameraCalibration& calibration, double baseline_m, const Eigen::Vector3d& point_in_camera,
+                       const PixelObservation& observation);
 
 // The residual alone.
 Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, double baseline_m,
                                      const Eigen::Vector3d& point_in_camera, const PixelObservation& observation);
 
-// 95 % of observations without a gross error have a squared residual below this (chi-square, 2 or 3 degrees of freedom).
+// 95 % of observations without a gross error have a squared residual below this (chi-square, 2 or 3 degrees of
+// freedom).
 inline double Chi2Limit(bool has_right) { return has_right ? 7.815 : 5.991; }
 
 // Weight of a squared residual under Huber's loss with corner `corner_squared`: 1 below it, then falling like 1/|r|.

@@ -46,7 +46,9 @@ struct Sim3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  static Sim3 From(const Rigid3& a_from_b, double scale = 1.0) { return {scale, a_from_b.rotation, a_from_b.translation}; }
+  static Sim3 From(const Rigid3& a_from_b, double scale = 1.0) {
+    return {scale, a_from_b.rotation, a_from_b.translation};
+  }
   // Where frame b stands and how it is turned, without its scale.
   Rigid3 Pose() const { return {rotation, translation}; }
   Sim3 Inverse() const {

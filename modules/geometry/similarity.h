@@ -51,11 +51,11 @@ struct SimilarityEstimate {
   double rotation_sigma_rad = 0.0;  // of the worst axis; infinite if open
 };
 
-// Without a guess to start from: RANSAC over triples (AlignPoints). A pair is an inlier if each keyframe sees the other's
-// point within the chi-square limit (e' W e, see below) and the two depths agree to 3 sigmas (of d). Each new best is
-// refined on its inliers (O. Chum, J. Matas, J. Kittler, "Locally Optimized RANSAC", DAGM 2003), since the depths of
-// three points are noisy. `seed` decides the samples. nullopt: fewer than min_inliers agree, or they leave the rotation
-// open (max_rotation_sigma_rad). Throws std::invalid_argument with Check()'s sentence.
+// Without a guess to start from: RANSAC over triples (AlignPoints). A pair is an inlier if each keyframe sees the
+// other's point within the chi-square limit (e' W e, see below) and the two depths agree to 3 sigmas (of d). Each new
+// best is refined on its inliers (O. Chum, J. Matas, J. Kittler, "Locally Optimized RANSAC", DAGM 2003), since the
+// depths of three points are noisy. `seed` decides the samples. nullopt: fewer than min_inliers agree, or they leave
+// the rotation open (max_rotation_sigma_rad). Throws std::invalid_argument with Check()'s sentence.
 std::optional<SimilarityEstimate> EstimateSimilarity(const CameraCalibration& calibration,
                                                      std::span<const PointPair> pairs, uint64_t seed,
                                                      const SimilarityOptions& options);
@@ -69,8 +69,8 @@ std::optional<SimilarityEstimate> EstimateSimilarity(const CameraCalibration& ca
 //   W  = (I + a a')^-1,  a = de/d(ln depth) * depth_sigma: so much of e is owed to the depth of the point
 //   d  = ln(z(S * point_in_second) / z(point_in_first)) / (sqrt(2) depth_sigma)          (where baseline_m is 0)
 //
-// with Huber's rho at the 95 % limits. The first round takes pairs up to three times the limit, for a rough start; after
-// each, pairs are sorted anew. With fewer than 3 inliers the start comes back and num_inliers is 0; it is for the
+// with Huber's rho at the 95 % limits. The first round takes pairs up to three times the limit, for a rough start;
+// after each, pairs are sorted anew. With fewer than 3 inliers the start comes back and num_inliers is 0; it is for the
 // caller to judge num_inliers and rotation_sigma_rad. Throws std::invalid_argument with Check()'s sentence.
 SimilarityEstimate RefineSimilarity(const CameraCalibration& calibration, std::span<const PointPair> pairs,
                                     const Sim3& first_from_second, const SimilarityOptions& options);

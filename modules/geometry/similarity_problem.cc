@@ -14,11 +14,11 @@ using Vector7d = Eigen::Matrix<double, 7, 1>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMinDepth = 1e-6;
-constexpr double kDepthCorner2 = 3.841;   // chi-square of 95 %, 1 degree of freedom
-constexpr double kMaxDepthResidual = 3.0; // sigmas; the depths of far points have long tails
-constexpr double kFirstDamping = 1e-6;    // of the diagonal; nearly Gauss-Newton from a fair start
+constexpr double kDepthCorner2 = 3.841;    // chi-square of 95 %, 1 degree of freedom
+constexpr double kMaxDepthResidual = 3.0;  // sigmas; the depths of far points have long tails
+constexpr double kFirstDamping = 1e-6;     // of the diagonal; nearly Gauss-Newton from a fair start
 constexpr double kMaxDamping = 1e6;
-constexpr double kEnoughGain = 1e-8;      // a step that lowers the cost by a smaller part of it ends the round
+constexpr double kEnoughGain = 1e-8;  // a step that lowers the cost by a smaller part of it ends the round
 
 double HuberCost(double squared, double corner_squared) {
   return squared <= corner_squared ? squared : 2.0 * std::sqrt(squared * corner_squared) - corner_squared;
@@ -64,8 +64,8 @@ void SimilarityProblem::Append(const Eigen::Vector3d& point, const PixelObservat
   seen_by_other.right_x_px = options_.baseline_m > 0.0 ? seen_by_other.right_x_px : kNoColumn;
   // disparity = fx baseline / z:  sigma_z / z = sigma_px z / (fx baseline)
   const bool has_depth = options_.baseline_m > 0.0 && seen_with_it.has_right();
-  const double measured = has_depth ? seen_with_it.sigma_px * point.z() / (calibration_.fx_px * options_.baseline_m)
-                                    : options_.depth_sigma;
+  const double measured =
+      has_depth ? seen_with_it.sigma_px * point.z() / (calibration_.fx_px * options_.baseline_m) : options_.depth_sigma;
   sights.points.push_back(point);
   sights.seen.push_back(seen_by_other);
   sights.depth_sigmas.push_back(std::min(options_.depth_sigma, measured));
@@ -86,9 +86,9 @@ SimilarityEstimate SimilarityProblem::Classify(const Sim3& first_from_second, do
   SimilarityEstimate estimate{first_from_second, std::vector<char>(num_pairs_, 0), 0, kInfinity};
   for (size_t i = 0; i < num_pairs_; ++i) {
     const double moved_z = (first_from_second * in_first_.points[i]).z();
-    const bool fits = Fits(first_from_second, factor, i, in_first_) && Fits(second_from_first, factor, i, in_second_) &&
-                      (!UsesDepths() ||
-                       std::abs(DepthResidual(moved_z, in_second_.points[i].z())) <= kMaxDepthResidual);
+    const bool fits =
+        Fits(first_from_second, factor, i, in_first_) && Fits(second_from_first, factor, i, in_second_) &&
+        (!UsesDepths() || std::abs(DepthResidual(moved_z, in_second_.points[i].z())) <= kMaxDepthResidual);
     estimate.is_inlier[i] = fits ? 1 : 0;
     estimate.num_inliers += fits ? 1 : 0;
   }
@@ -185,8 +185,7 @@ double SimilarityProblem::RotationSigma(const SimilarityEstimate& estimate) cons
   return variances.minCoeff() > 0.0 ? std::sqrt(variances.maxCoeff()) : kInfinity;
 }
 
-SimilarityEstimate SimilarityProblem::Refine(const Sim3& first_from_second, int num_rounds,
-                                             double first_factor) {
+SimilarityEstimate SimilarityProblem::Refine(const Sim3& first_from_second, int num_rounds, double first_factor) {
   SimilarityEstimate estimate = Classify(first_from_second, first_factor);
   for (int round = 0; round < num_rounds && estimate.num_inliers >= kMinSimilarityInliers; ++round) {
     const std::vector<char> took_part = estimate.is_inlier;

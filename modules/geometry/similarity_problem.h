@@ -15,7 +15,8 @@ namespace tessera {
 
 inline constexpr int kMinSimilarityInliers = 3;  // points that fix seven degrees of freedom
 
-// The pairs of RefineSimilarity's sum, with weights that are brought up to date each round. See there for the equations.
+// The pairs of RefineSimilarity's sum, with weights that are brought up to date each round. See there for the
+// equations.
 class SimilarityProblem {
  public:
   SimilarityProblem(const CameraCalibration& calibration, std::span<const PointPair> pairs,
@@ -56,7 +57,7 @@ class SimilarityProblem {
   const CameraCalibration& calibration_;
   const SimilarityOptions& options_;
   const size_t num_pairs_;
-  Sights in_first_;   // points of the second keyframe, seen by the first
+  Sights in_first_;  // points of the second keyframe, seen by the first
   Sights in_second_;
 };
 

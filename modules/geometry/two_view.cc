@@ -139,16 +139,16 @@ Candidate Evaluate(const Problem& problem, const RefinedMotion& motion) {
 
 std::vector<Rigid3> PossibleMotions(const Problem& problem, uint64_t seed) {
   std::vector<Rigid3> motions;
-  const auto essential = SampleModel<8>(
-      problem, seed, problem.limit_squared, EssentialFromPairs, [](const Eigen::Matrix3d& e, const RayPair& pair) {
-        const double distance = SampsonDistance(e, pair);
-        return distance * distance;
-      });
+  const auto essential = SampleModel<8>(problem, seed, problem.limit_squared, EssentialFromPairs,
+                                        [](const Eigen::Matrix3d& e, const RayPair& pair) {
+                                          const double distance = SampsonDistance(e, pair);
+                                          return distance * distance;
+                                        });
   if (essential) {
     motions = MotionsFromEssential(*essential);
   }
-  const auto homography = SampleModel<4>(problem, seed + 1, problem.limit_squared * 5.991 / 3.841,
-                                         HomographyFromPairs, TransferErrorSquared);
+  const auto homography = SampleModel<4>(problem, seed + 1, problem.limit_squared * 5.991 / 3.841, HomographyFromPairs,
+                                         TransferErrorSquared);
   if (homography) {
     const std::vector<Rigid3> more = MotionsFromHomography(*homography);
     motions.insert(motions.end(), more.begin(), more.end());

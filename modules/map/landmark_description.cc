@@ -68,4 +68,12 @@ Landmark DescribeLandmark(const Map& map, LandmarkId id) {
   return landmark;
 }
 
+Landmark InWorld(const Sim3& world_from_keyframe, Landmark point) {
+  point.position_in_world = world_from_keyframe * point.position_in_world;
+  point.normal = world_from_keyframe.rotation * point.normal;
+  point.min_distance *= world_from_keyframe.scale;
+  point.max_distance *= world_from_keyframe.scale;
+  return point;
+}
+
 }  // namespace tessera

@@ -15,10 +15,13 @@ namespace tessera {
 // (the medoid, as in ORB-SLAM: Mur-Artal et al. 2015); ties go to the older keyframe. To bound the work, at most the
 // newest kMaxDescriptors observations count for it.
 Landmark DescribeLandmark(const Map& map, LandmarkId id);
-// The same for a landmark whose observations are those that its descriptor was chosen from: it keeps the descriptor, which
-// is most of the work.
+// The same for a landmark whose observations are those that its descriptor was chosen from: it keeps the descriptor,
+// which is most of the work.
 Landmark DescribeMovedLandmark(const Map& map, LandmarkId id);
 
 inline constexpr int kMaxDescriptors = 12;
+
+// The landmark of a keyframe's frame and units in the world's.
+Landmark InWorld(const Sim3& world_from_keyframe, Landmark point_in_keyframe);
 
 }  // namespace tessera

@@ -50,9 +50,8 @@ LocalWindow SelectLocalWindow(const Map& map, KeyframeId center, const LocalWind
   members.insert(window.outer.begin(), window.outer.end());
   std::erase_if(window.landmarks, [&](LandmarkId landmark) {
     const std::vector<Observation>& observations = map.ObservationsOf(landmark);
-    return std::count_if(observations.begin(), observations.end(), [&](const Observation& observation) {
-             return members.contains(observation.keyframe);
-           }) < 2;
+    return std::count_if(observations.begin(), observations.end(),
+                         [&](const Observation& observation) { return members.contains(observation.keyframe); }) < 2;
   });
   return window;
 }

@@ -9,8 +9,9 @@
 namespace tessera {
 namespace {
 
-// The hash of a map is the sum (modulo 2^64) of the hashes of its facts, so that it follows each change at once and does
-// not depend on the order of changes. A fact's hash mixes its words by the finaliser of SplitMix64 (Steele et al. 2014).
+// The hash of a map is the sum (modulo 2^64) of the hashes of its facts, so that it follows each change at once and
+// does not depend on the order of changes. A fact's hash mixes its words by the finaliser of SplitMix64 (Steele et al.
+// 2014).
 class FactHash {
  public:
   explicit FactHash(uint64_t kind) : state_(kind) {}
@@ -35,7 +36,8 @@ uint64_t HashOf(const FeatureFrame& features) {
   hash.Add(features.frame.value).Add(features.utime_us).Add(static_cast<int64_t>(features.keypoints.size()));
   const CameraCalibration& camera = features.calibration;
   hash.Add(static_cast<int64_t>(camera.sensor)).Add(int64_t{camera.width_px}).Add(int64_t{camera.height_px});
-  for (const double number : {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m, camera.depth_unit_m}) {
+  for (const double number :
+       {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m, camera.depth_unit_m}) {
     hash.Add(number);
   }
   for (size_t i = 0; i < features.keypoints.size(); ++i) {
@@ -123,9 +125,13 @@ std::string Map::ApplyLists(const MapDelta& delta) {
       return Name(added.id) + " can't be added";
     }
     const size_t num_keypoints = added.features->keypoints.size();
-    const Keyframe& keyframe =
-        keyframes_.Put(added.id, {added.features, HashOf(*added.features), added.world_from_camera, added.scale, added.parent,
-                                  std::vector<LandmarkId>(num_keypoints), {}});
+    const Keyframe& keyframe = keyframes_.Put(added.id, {added.features,
+                                                         HashOf(*added.features),
+                                                         added.world_from_camera,
+                                                         added.scale,
+                                                         added.parent,
+                                                         std::vector<LandmarkId>(num_keypoints),
+                                                         {}});
     hash_ += HashOf(added.id, keyframe);
   }
   for (const MapDelta::MovedKeyframe& moved : delta.moved_keyframes) {
@@ -191,7 +197,8 @@ std::string Map::AddObservation(const MapDelta::ChangedObservation& change) {
       keyframe->landmarks[static_cast<size_t>(observation.keypoint)].valid()) {
     return Name(observation.keyframe) + " can't observe " + Name(landmark);
   }
-  const auto place = std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
+  const auto place =
+      std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
   if (place != observations->end() && place->keyframe == observation.keyframe) {
     return Name(observation.keyframe) + " can't observe " + Name(landmark) + " twice";
   }
@@ -262,8 +269,7 @@ MapDelta Map::Snapshot() const {
   delta.is_snapshot = true;
   delta.hash = hash_;
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-    delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features,
-                                   keyframe.scale});
+    delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features, keyframe.scale});
   });
   landmarks_.ForEach([&](LandmarkId id, const Landmark& landmark) {
     delta.changed_landmarks.push_back({id, landmark});

@@ -1,8 +1,8 @@
 // The map: keyframes, landmarks, and which keyframe saw which landmark where.
 //
-// The mapper alone decides on changes. It writes them down as numbered deltas, and everybody, the mapper included, holds
-// a map that changes by Apply(delta) and by nothing else. So all replicas are equal, and the hash that each delta carries
-// shows at once if one is not. A snapshot is a delta that starts from the empty map.
+// The mapper alone decides on changes. It writes them down as numbered deltas, and everybody, the mapper included,
+// holds a map that changes by Apply(delta) and by nothing else. So all replicas are equal, and the hash that each delta
+// carries shows at once if one is not. A snapshot is a delta that starts from the empty map.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,7 +30,7 @@ struct Observation {
 struct Landmark {
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // metres (mono: units of the map)
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // mean unit direction from the landmark to the cameras that saw it
-  double min_distance = 0.0;  // between these distances from a camera its scale fits the pyramid
+  double min_distance = 0.0;                         // between these distances from a camera its scale fits the pyramid
   double max_distance = 0.0;
   Descriptor descriptor{};  // the observation's that is nearest to all others
   bool operator==(const Landmark&) const = default;
@@ -38,8 +38,8 @@ struct Landmark {
 
 // A keyframe in the map: its features never change, its pose does.
 //
-// Closing a loop of mono changes the scale of the map, by another factor at each keyframe. What was measured relative to
-// a keyframe (poses of frames) stays true in the units of that time: those of its map part when it began.
+// Closing a loop of mono changes the scale of the map, by another factor at each keyframe. What was measured relative
+// to a keyframe (poses of frames) stays true in the units of that time: those of its map part when it began.
 struct Keyframe {
   std::shared_ptr<const FeatureFrame> features;
   uint64_t features_hash = 0;  // of their exact content
@@ -50,8 +50,8 @@ struct Keyframe {
   Sim3 WorldFromKeyframe() const { return Sim3::From(world_from_camera, scale); }
 
   KeyframeId parent;  // spanning tree: the older keyframe that shared most landmarks at birth; invalid: the root
-  std::vector<LandmarkId> landmarks;         // by keypoint; invalid: none
-  std::map<KeyframeId, int32_t> covisible;   // keyframes that share landmarks, and how many
+  std::vector<LandmarkId> landmarks;        // by keypoint; invalid: none
+  std::map<KeyframeId, int32_t> covisible;  // keyframes that share landmarks, and how many
 };
 
 // Two keyframes that see the same place, and by which the map was bent so that they agree.
@@ -91,9 +91,9 @@ struct MapDelta {
     KeyframeId parent;
   };
 
-  int64_t number = 0;         // counts from 0; a replica applies them in order
-  KeyframeId answers;         // the keyframe whose processing made this delta; its place in logical time
-  bool is_snapshot = false;   // starts from the empty map, whatever the replica held
+  int64_t number = 0;        // counts from 0; a replica applies them in order
+  KeyframeId answers;        // the keyframe whose processing made this delta; its place in logical time
+  bool is_snapshot = false;  // starts from the empty map, whatever the replica held
   std::vector<NewKeyframe> new_keyframes;
   std::vector<MovedKeyframe> moved_keyframes;
   std::vector<ChangedLandmark> changed_landmarks;  // new ones too
@@ -103,8 +103,8 @@ struct MapDelta {
   std::vector<LandmarkId> removed_landmarks;  // must have no observations left
   std::vector<KeyframeId> removed_keyframes;  // likewise
   std::vector<ClosedLoop> closed_loops;
-  bool asks_adjustment = false;               // what the global adjuster makes of the map after this delta is waited for
-  uint64_t hash = 0;                          // of the map after this delta
+  bool asks_adjustment = false;  // what the global adjuster makes of the map after this delta is waited for
+  uint64_t hash = 0;             // of the map after this delta
 };
 
 class Map {

@@ -16,7 +16,7 @@ void MapEditor::Apply(MapDelta&& part) {
 void MapEditor::AddKeyframe(KeyframeId id, KeyframeId parent, const Sim3& world_from_keyframe,
                             std::shared_ptr<const FeatureFrame> features) {
   const MapDelta::NewKeyframe added{id, parent, world_from_keyframe.Pose(), std::move(features),
-                                      world_from_keyframe.scale};
+                                    world_from_keyframe.scale};
   Apply({.new_keyframes = {added}});
   new_keyframes_[id] = added;
 }

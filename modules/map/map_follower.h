@@ -53,7 +53,7 @@ class MapFollower {
   bool lacks_start_;
   bool needs_snapshot_ = false;
   int64_t next_delta_ = 0;
-  int64_t num_known_ = 0;  // at least so many exist
+  int64_t num_known_ = 0;             // at least so many exist
   std::map<int64_t, Delta> waiting_;  // by number
   std::optional<Collected> collected_;
   Delta snapshot_;  // complete, and not yet taken

@@ -25,9 +25,9 @@ struct RemovedInDelta {
 
 class RemovedKeyframes {
  public:
-  // To be called with each delta before it is applied to `map`. Removed keyframes are tied to their parent, as it stands
-  // in the map then (a parent that goes too, or has gone before, passes them on to its own). A snapshot removes all that
-  // it does not hold.
+  // To be called with each delta before it is applied to `map`. Removed keyframes are tied to their parent, as it
+  // stands in the map then (a parent that goes too, or has gone before, passes them on to its own). A snapshot removes
+  // all that it does not hold.
   void Remember(const Map& map, const MapDelta& delta);
   // Ties one keyframe of the map to its parent.
   void Remember(const Map& map, KeyframeId id);
@@ -47,8 +47,8 @@ class RemovedKeyframes {
   std::map<KeyframeId, Tie> ties_;
 };
 
-// The owner's memory of where keyframes stood before its last delta, from which it tells what followers remember, to the
-// last bit: 100 bytes for each keyframe.
+// The owner's memory of where keyframes stood before its last delta, from which it tells what followers remember, to
+// the last bit: 100 bytes for each keyframe.
 class KeyframePlaces {
  public:
   // `map`: the owner's, with which it begins.

@@ -23,8 +23,7 @@ bool IsFinite(const BundleProblem& problem) {
                      [](const BundlePoint& point) { return point.position_in_world.allFinite(); }) &&
          std::all_of(problem.observations.begin(), problem.observations.end(),
                      [](const BundleObservation& o) {
-                       return o.seen.pixel_px.allFinite() &&
-                              (!o.seen.has_right() || std::isfinite(o.seen.right_x_px));
+                       return o.seen.pixel_px.allFinite() && (!o.seen.has_right() || std::isfinite(o.seen.right_x_px));
                      }) &&
          std::all_of(problem.constraints.begin(), problem.constraints.end(),
                      [](const RelativePoseConstraint& c) { return IsFinite(c.to_from_from); });
@@ -71,10 +70,11 @@ std::vector<char> InFront(const BundleProblem& problem) {
   return is_in_front;
 }
 
-// Mono: scales the world about the fixed camera's centre until `scale_pose` is as far from it as it was. No pixel moves.
+// Mono: scales the world about the fixed camera's centre until `scale_pose` is as far from it as it was. No pixel
+// moves.
 void RestoreScale(const BundleProblem& problem, BundleResult& result) {
-  const auto fixed = std::find_if(problem.poses.begin(), problem.poses.end(),
-                                  [](const BundlePose& pose) { return pose.is_fixed; });
+  const auto fixed =
+      std::find_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
   const Eigen::Vector3d origin = fixed->camera_from_world.Inverse().translation;
   const auto scaled = static_cast<size_t>(problem.scale_pose);
   const double before = (problem.poses[scaled].camera_from_world.Inverse().translation - origin).norm();
@@ -125,8 +125,8 @@ std::string CheckConstraints(const BundleProblem& problem) {
 }
 
 std::string CheckGauge(const BundleProblem& problem) {
-  const auto num_fixed = std::count_if(problem.poses.begin(), problem.poses.end(),
-                                       [](const BundlePose& pose) { return pose.is_fixed; });
+  const auto num_fixed =
+      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
   if (num_fixed == 0) {
     return "no pose is fixed; fix one at least (gauge)";
   }
@@ -209,11 +209,11 @@ std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const Bun
   if (!IsFinite(problem)) {
     return std::nullopt;
   }
-  const auto num_free = std::count_if(problem.poses.begin(), problem.poses.end(),
-                                      [](const BundlePose& pose) { return !pose.is_fixed; });
+  const auto num_free =
+      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return !pose.is_fixed; });
   const bool is_window = num_free <= options.max_num_dense_poses && !options.is_always_ceres;
-  std::optional<BundleResult> result = is_window ? AdjustInRounds<WindowSolver>(problem, options)
-                                                 : AdjustInRounds<BundleSolver>(problem, options);
+  std::optional<BundleResult> result =
+      is_window ? AdjustInRounds<WindowSolver>(problem, options) : AdjustInRounds<BundleSolver>(problem, options);
   if (!result) {
     return std::nullopt;
   }

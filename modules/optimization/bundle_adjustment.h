@@ -14,9 +14,9 @@
 namespace tessera {
 
 struct BundlePose {
-  KeyframeId id;              // for the caller; the solver goes by index
-  Rigid3 camera_from_world;   // metres (mono: units of the map)
-  bool is_fixed = false;      // held where it is: part of the gauge
+  KeyframeId id;             // for the caller; the solver goes by index
+  Rigid3 camera_from_world;  // metres (mono: units of the map)
+  bool is_fixed = false;     // held where it is: part of the gauge
 };
 
 struct BundlePoint {
@@ -32,9 +32,9 @@ struct BundleObservation {
 
 // What is known of the motion between two keyframes, instead of their common landmarks: the outer window's tie.
 struct RelativePoseConstraint {
-  int from = -1;           // indices into BundleProblem::poses
+  int from = -1;  // indices into BundleProblem::poses
   int to = -1;
-  Rigid3 to_from_from;     // the motion to be kept: point_in_to = to_from_from * point_in_from
+  Rigid3 to_from_from;  // the motion to be kept: point_in_to = to_from_from * point_in_from
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Identity();  // of Retract's tangent
 };
 
@@ -57,8 +57,8 @@ struct BundleOptions {
   int max_num_iterations = 10;       // a round; a warm start takes 3 to 6
   int num_rounds = 2;                // after each, observations are sorted anew into inliers and outliers
   double function_tolerance = 1e-4;  // a round ends when a step lowers the cost by less than this part of it
-  // Of the trust region at the start of a round, as Ceres has it: damping is the curvature's diagonal over this. The slow
-  // modes of a long street have a curvature far below the diagonal: where they must move, begin with less damping.
+  // Of the trust region at the start of a round, as Ceres has it: damping is the curvature's diagonal over this. The
+  // slow modes of a long street have a curvature far below the diagonal: where they must move, begin with less damping.
   double initial_radius = 1e4;
   // Up to this many free poses the reduced camera system is solved dense, above it sparse. Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
@@ -70,22 +70,22 @@ struct BundleOptions {
   std::string Check() const;
 };
 
-// For a whole map after a loop was closed (README.md has the measurements): little damping, and steps that gain little are
-// worth taking, since a street may bend by metres for a millionth of the cost.
+// For a whole map after a loop was closed (README.md has the measurements): little damping, and steps that gain little
+// are worth taking, since a street may bend by metres for a millionth of the cost.
 BundleOptions GlobalBundleOptions();
 
 struct BundleResult {
-  std::vector<Rigid3> camera_from_world;             // by pose; fixed ones to the bit as given
-  std::vector<Eigen::Vector3d> positions_in_world;   // by point; as given where no inlier observation moves it
-  std::vector<char> is_inlier;                       // by observation: 1 if in front of the camera and within Chi2Limit
+  std::vector<Rigid3> camera_from_world;            // by pose; fixed ones to the bit as given
+  std::vector<Eigen::Vector3d> positions_in_world;  // by point; as given where no inlier observation moves it
+  std::vector<char> is_inlier;                      // by observation: 1 if in front of the camera and within Chi2Limit
   int num_inliers = 0;
   double initial_cost = 0.0;  // half the robust sum of squares before the first round, over its observations
   double final_cost = 0.0;    // after the last round, over those that took part in it
   int num_iterations = 0;     // of all rounds
 };
 
-// Minimises over the free camera_from_world and all points, by Levenberg-Marquardt with the points eliminated (Schur): in
-// Ceres, but for local windows (BundleOptions),
+// Minimises over the free camera_from_world and all points, by Levenberg-Marquardt with the points eliminated (Schur):
+// in Ceres, but for local windows (BundleOptions),
 //
 //   1/2 sum_obs rho(|e|^2) + 1/2 sum_constraints r' information r
 //
@@ -96,12 +96,14 @@ struct BundleResult {
 // exceed the limit take no part in the next; they may return. A round that changes none of them is the last.
 //
 // With poses seen by nobody but constraints this is the double window of H. Strasdat, A. Davison, J. M. M. Montiel,
-// K. Konolige, "Double Window Optimisation for Constant Time Visual SLAM", ICCV 2011: reprojection errors inside, relative
-// poses outside. With two poses it is the first bundle adjustment of mono initialisation (scale_pose = the second).
+// K. Konolige, "Double Window Optimisation for Constant Time Visual SLAM", ICCV 2011: reprojection errors inside,
+// relative poses outside. With two poses it is the first bundle adjustment of mono initialisation (scale_pose = the
+// second).
 //
 // The result is a pure function of the values given; the order of the lists decides its last bits only. Throws
-// std::invalid_argument with Check()'s sentence where problem or options are malformed. nullopt where there is nothing to
-// optimise (no usable observation or constraint on anything free), a value is not finite, or the solver found no step.
+// std::invalid_argument with Check()'s sentence where problem or options are malformed. nullopt where there is nothing
+// to optimise (no usable observation or constraint on anything free), a value is not finite, or the solver found no
+// step.
 std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const BundleOptions& options);
 
 }  // namespace tessera

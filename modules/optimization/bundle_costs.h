@@ -1,10 +1,10 @@
 // The residuals of bundle adjustment as Ceres wants them. Only this module's sources and its tests include this file.
 //
 // A pose is optimised as a tangent (v, w) at the pose where the solve began (MoveBy), so that Ceres sees plain vectors.
-// Corrections are far below half a turn, where this is a chart without seams. Seen from the world a camera's centre moves
-// straight, by v, and w turns the camera where it is. A whole street that bends, cameras and points, is then nearly linear
-// in the parameters, and steps along it can be long; with Retract, where w turns v as well, the first steps after a loop
-// are many times shorter (README.md). What depends on the pose alone is computed once an evaluation
+// Corrections are far below half a turn, where this is a chart without seams. Seen from the world a camera's centre
+// moves straight, by v, and w turns the camera where it is. A whole street that bends, cameras and points, is then
+// nearly linear in the parameters, and steps along it can be long; with Retract, where w turns v as well, the first
+// steps after a loop are many times shorter (README.md). What depends on the pose alone is computed once an evaluation
 // (EvaluationCallback), not once an observation.
 #pragma once
 
@@ -40,8 +40,8 @@ Rigid3 MoveBy(const Rigid3& camera_from_world, const Eigen::Matrix<double, 6, 1>
 
 // A pose while Ceres moves it.
 struct MovingPose {
-  Rigid3 base;                       // camera_from_world at tangent zero
-  const double* tangent = nullptr;   // (v, w): Ceres' 6 parameters
+  Rigid3 base;                      // camera_from_world at tangent zero
+  const double* tangent = nullptr;  // (v, w): Ceres' 6 parameters
 
   // Of camera_from_world, as of the last Update().
   Eigen::Matrix3d rotation;

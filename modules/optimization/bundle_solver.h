@@ -21,8 +21,8 @@ class BundleSolver {
   // Both must outlive the solver; problem and options must be well formed, and the problem finite.
   BundleSolver(const BundleProblem& problem, const BundleOptions& options);
 
-  // One robust least-squares solve over the constraints and the observations with takes_part[i] != 0, from where the last
-  // one ended. nullopt: nothing free takes part, or Ceres failed; the state is then unspecified.
+  // One robust least-squares solve over the constraints and the observations with takes_part[i] != 0, from where the
+  // last one ended. nullopt: nothing free takes part, or Ceres failed; the state is then unspecified.
   std::optional<BundleSummary> Solve(const std::vector<char>& takes_part);
 
   // The poses and points as they are now.

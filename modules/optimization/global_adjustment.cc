@@ -15,8 +15,7 @@ LocalWindow WholePart(const Map& map, KeyframeId member) {
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
     const std::vector<Observation>& observations = map.ObservationsOf(id);
     if (observations.size() < 2) return;
-    const bool is_inside =
-        std::binary_search(window.inner.begin(), window.inner.end(), observations.front().keyframe);
+    const bool is_inside = std::binary_search(window.inner.begin(), window.inner.end(), observations.front().keyframe);
     if (is_inside) window.landmarks.push_back(id);
   });
   return window;

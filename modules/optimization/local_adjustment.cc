@@ -4,7 +4,7 @@
 #include <set>
 #include <utility>
 
-#include "tracking/landmark_view.h"
+#include "measurement/landmark_view.h"
 
 namespace tessera {
 namespace {
@@ -19,8 +19,8 @@ void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleP
   for (const KeyframeId id : window.outer) {
     add(id, !is_double || id == window.outer.front());
   }
-  const auto num_fixed = std::count_if(problem.poses.begin(), problem.poses.end(),
-                                       [](const BundlePose& pose) { return pose.is_fixed; });
+  const auto num_fixed =
+      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
   if (num_fixed == 0) problem.poses.front().is_fixed = true;
 }
 
@@ -58,8 +58,8 @@ void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size
 void AddTies(const Map& map, size_t num_inner, BundleProblem& problem) {
   const double rad_per_px = kKeypointSigmaPx / problem.calibration.fx_px;
   const auto index_of = [&](KeyframeId id) {
-    const auto found = std::find_if(problem.poses.begin(), problem.poses.end(),
-                                    [&](const BundlePose& pose) { return pose.id == id; });
+    const auto found =
+        std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& pose) { return pose.id == id; });
     return static_cast<size_t>(found - problem.poses.begin());
   };
   std::set<std::pair<size_t, size_t>> ties;
@@ -86,8 +86,8 @@ void AddTies(const Map& map, size_t num_inner, BundleProblem& problem) {
 
 // Mono with a single fixed pose: the free pose of the lowest id keeps its distance.
 int ScalePose(const BundleProblem& problem) {
-  const auto num_fixed = std::count_if(problem.poses.begin(), problem.poses.end(),
-                                       [](const BundlePose& pose) { return pose.is_fixed; });
+  const auto num_fixed =
+      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
   const bool has_right = std::any_of(problem.observations.begin(), problem.observations.end(),
                                      [](const BundleObservation& o) { return o.seen.has_right(); });
   if (num_fixed > 1 || has_right) return -1;

@@ -7,8 +7,8 @@
 
 namespace tessera {
 
-// The optimisation problem of a window: inner poses free, outer ones fixed; a root of the spanning tree is fixed too. If
-// nothing else fixes a pose, the oldest inner one is; mono then keeps the distance of the next one (scale).
+// The optimisation problem of a window: inner poses free, outer ones fixed; a root of the spanning tree is fixed too.
+// If nothing else fixes a pose, the oldest inner one is; mono then keeps the distance of the next one (scale).
 //
 // The double window: outer poses are free but for the oldest, observe nothing, and are tied to up to kMaxTies of the
 // keyframes of the window that share most landmarks with them. A tie keeps the relative pose as it is, as firmly as the

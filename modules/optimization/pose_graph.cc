@@ -62,9 +62,9 @@ ceres::Solver::Options SolverOptions(const PoseGraphOptions& options) {
   // Both depend on the map's unit.
   solver.gradient_tolerance = 0.0;
   solver.parameter_tolerance = 0.0;
-  // The first steps are Gauss-Newton's. The error of a loop is spread by the slowest modes of a chain, whose curvature is
-  // (length of the chain)^-2 of the diagonal: with Ceres' 1e4 damping would hold them for many steps, and 20 iterations
-  // end long before the minimum.
+  // The first steps are Gauss-Newton's. The error of a loop is spread by the slowest modes of a chain, whose curvature
+  // is (length of the chain)^-2 of the diagonal: with Ceres' 1e4 damping would hold them for many steps, and 20
+  // iterations end long before the minimum.
   solver.initial_trust_region_radius = 1e16;
   solver.max_solver_time_in_seconds = 1e9;  // iterations bound it, never the clock: results must not depend on load
   solver.num_threads = 1;
@@ -77,7 +77,9 @@ template <int kSize>
 class PoseGraphSolver {
  public:
   PoseGraphSolver(const PoseGraphProblem& problem, const PoseGraphOptions& options)
-      : problem_(problem), options_(options), is_tied_(TiedToFixed(problem)),
+      : problem_(problem),
+        options_(options),
+        is_tied_(TiedToFixed(problem)),
         tangents_(kSize * problem.nodes.size(), 0.0) {
     for (size_t i = 0; i < problem.nodes.size(); ++i) {
       MovingNode node;

@@ -22,8 +22,9 @@ struct PoseGraphEdge {
   int to = -1;
   Sim3 to_from_from;
   double weight = 1.0;  // of the squared residual; two edges alike are one of weight 2
-  // What translations are measured by, in the units of to_from_from's side `from`: the median depth of what the keyframe
-  // sees, or, without landmarks at hand, the distance of the two. It makes the result independent of the map's unit.
+  // What translations are measured by, in the units of to_from_from's side `from`: the median depth of what the
+  // keyframe sees, or, without landmarks at hand, the distance of the two. It makes the result independent of the map's
+  // unit.
   double length = 1.0;
 };
 
@@ -40,7 +41,7 @@ struct PoseGraphOptions {
   int max_num_iterations = 20;       // Levenberg-Marquardt steps; a loop of 3000 keyframes takes 5 to 10
   double function_tolerance = 1e-5;  // ends when a step lowers the cost by less than this part of it
   // Standard deviations of what odometry gets wrong between two keyframes; only their ratios matter (README.md).
-  double translation_sigma = 0.01;   // as a part of PoseGraphEdge::length
+  double translation_sigma = 0.01;  // as a part of PoseGraphEdge::length
   double rotation_sigma_rad = 0.001;
   double log_scale_sigma = 0.01;
 
@@ -58,8 +59,8 @@ struct PoseGraphOptions {
 // ln s) equals the logarithm of Sim(3) that is used there to first order. Without scale r has six rows.
 //
 // Returns world_from_keyframe by node; fixed nodes, and those that no chain of edges ties to a fixed one, to the bit as
-// given. A pure function of the values given. Throws std::invalid_argument with Check()'s sentence where problem or options
-// are malformed. nullopt where nothing is free, a value is not finite, or the solver found no step.
+// given. A pure function of the values given. Throws std::invalid_argument with Check()'s sentence where problem or
+// options are malformed. nullopt where nothing is free, a value is not finite, or the solver found no step.
 std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& problem, const PoseGraphOptions& options);
 
 }  // namespace tessera

@@ -26,8 +26,10 @@ void NodeUpdater::PrepareForEvaluation(bool /*evaluate_jacobians*/, bool new_eva
 template <int kSize>
 PoseGraphCost<kSize>::PoseGraphCost(const PoseGraphEdge& edge, const PoseGraphOptions& options, const MovingNode& from,
                                     const MovingNode& to)
-    : from_from_to_(edge.to_from_from.Inverse()), measured_rotation_(from_from_to_.rotation.toRotationMatrix()),
-      from_(from), to_(to) {
+    : from_from_to_(edge.to_from_from.Inverse()),
+      measured_rotation_(from_from_to_.rotation.toRotationMatrix()),
+      from_(from),
+      to_(to) {
   const double factor = std::sqrt(edge.weight);
   whitening_.template head<3>().setConstant(factor / (edge.length * options.translation_sigma));
   whitening_.template segment<3>(3).setConstant(factor / options.rotation_sigma_rad);

@@ -4,8 +4,8 @@
 //
 //   world_from_keyframe = (scale e^c, Exp(w) rotation, translation + v),   tangent (v, w) or (v, w, c)
 //
-// Translations add in the world's frame, so that for given rotations and scales the residual of translation is linear in
-// all of them: after a large loop that is what lets the first steps be long.
+// Translations add in the world's frame, so that for given rotations and scales the residual of translation is linear
+// in all of them: after a large loop that is what lets the first steps be long.
 #pragma once
 
 #include <ceres/evaluation_callback.h>
@@ -43,8 +43,8 @@ class NodeUpdater final : public ceres::EvaluationCallback {
   std::span<MovingNode> nodes_;
 };
 
-// kSize: 7 with scale, 6 without, of residual and tangents alike; parameters: the tangents of `from` and `to`. Referenced
-// values must outlive the cost.
+// kSize: 7 with scale, 6 without, of residual and tangents alike; parameters: the tangents of `from` and `to`.
+// Referenced values must outlive the cost.
 template <int kSize>
 class PoseGraphCost final : public ceres::SizedCostFunction<kSize, kSize, kSize> {
  public:
@@ -53,7 +53,7 @@ class PoseGraphCost final : public ceres::SizedCostFunction<kSize, kSize, kSize>
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
-  const Sim3 from_from_to_;  // measured
+  const Sim3 from_from_to_;                  // measured
   const Eigen::Matrix3d measured_rotation_;  // of from_from_to_
   Eigen::Matrix<double, kSize, 1> whitening_;
   const MovingNode& from_;

@@ -12,9 +12,9 @@ namespace {
 
 // As Ceres has them.
 constexpr double kMinRadius = 1e-32;
-constexpr double kMinDiagonal = 1e-6;      // of J'J where damping is scaled by it
+constexpr double kMinDiagonal = 1e-6;  // of J'J where damping is scaled by it
 constexpr double kMinRelativeDecrease = 1e-3;
-constexpr double kMinModelDecrease = 1e-14;     // of the cost; below it rounding decides
+constexpr double kMinModelDecrease = 1e-14;  // of the cost; below it rounding decides
 
 // Huber's loss of a squared residual, and its derivative (HuberWeight).
 double HuberLoss(double squared, double corner_squared) {
@@ -106,13 +106,15 @@ double WindowSolver::Cost(const State& state) const {
           state.rotations[terms_[k].pose] * state.positions[point] + state.poses[terms_[k].pose].translation;
       sum += in_camera.z() < kMinDepth
                  ? LossBehind(seen.has_right(), seen.has_right() ? 3 : 2)
-                 : HuberLoss(ReprojectionResidual(problem_.calibration, problem_.baseline_m, in_camera, seen).squaredNorm(),
-                             Chi2Limit(seen.has_right()));
+                 : HuberLoss(
+                       ReprojectionResidual(problem_.calibration, problem_.baseline_m, in_camera, seen).squaredNorm(),
+                       Chi2Limit(seen.has_right()));
     }
   }
   for (const RelativePoseConstraint& c : problem_.constraints) {
     const RelativePoseTerm term(c);
-    sum += term.Residual(state.poses[static_cast<size_t>(c.from)], state.poses[static_cast<size_t>(c.to)]).squaredNorm();
+    sum +=
+        term.Residual(state.poses[static_cast<size_t>(c.from)], state.poses[static_cast<size_t>(c.to)]).squaredNorm();
   }
   return 0.5 * sum;
 }

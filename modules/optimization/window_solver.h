@@ -44,9 +44,9 @@ class WindowSolver {
   };
   // What a step would change.
   struct Step {
-    std::vector<Vector6d> poses;             // by free pose
-    std::vector<Eigen::Vector3d> points;     // by point
-    double model_decrease = 0.0;             // of the cost, by the linearised residuals
+    std::vector<Vector6d> poses;          // by free pose
+    std::vector<Eigen::Vector3d> points;  // by point
+    double model_decrease = 0.0;          // of the cost, by the linearised residuals
   };
 
   void SelectTerms(const std::vector<char>& takes_part);
@@ -59,26 +59,24 @@ class WindowSolver {
   std::optional<Step> SolveStep(double radius);
   Eigen::Vector3d BackSubstitute(size_t point, const std::vector<Vector6d>& poses) const;
   State Moved(const Step& step) const;
-  Matrix6d& ReducedBlock(int row, int column) {
-    return reduced_[static_cast<size_t>(row * (row + 1) / 2 + column)];
-  }
+  Matrix6d& ReducedBlock(int row, int column) { return reduced_[static_cast<size_t>(row * (row + 1) / 2 + column)]; }
 
   const BundleProblem& problem_;
   const BundleOptions& options_;
-  std::vector<int> free_of_pose_;      // by pose; -1: fixed
+  std::vector<int> free_of_pose_;  // by pose; -1: fixed
   std::vector<size_t> pose_of_free_;
 
   State state_;
-  std::vector<Term> terms_;            // point after point
-  std::vector<size_t> terms_of_point_; // by point: its first term; one more at the end
+  std::vector<Term> terms_;             // point after point
+  std::vector<size_t> terms_of_point_;  // by point: its first term; one more at the end
 
   // The linearised problem.
   std::vector<Matrix6d> u_;
   std::vector<Vector6d> g_pose_;
   std::vector<Eigen::Matrix3d> v_;
   std::vector<Eigen::Vector3d> g_point_;
-  std::vector<Matrix63d> w_;           // by term; only those of free poses are used
-  struct ConstraintBlock {             // of two free poses, row > column
+  std::vector<Matrix63d> w_;  // by term; only those of free poses are used
+  struct ConstraintBlock {    // of two free poses, row > column
     int row;
     int column;
     Matrix6d value;
@@ -87,7 +85,7 @@ class WindowSolver {
 
   // The reduced problem.
   std::vector<Eigen::Matrix3d> v_inverse_;
-  std::vector<Matrix6d> reduced_;      // lower triangle, row by row
+  std::vector<Matrix6d> reduced_;  // lower triangle, row by row
   std::vector<Vector6d> reduced_gradient_;
 };
 

@@ -72,9 +72,8 @@ std::vector<PlaceDatabase::Place> PlaceDatabase::Query(const BagOfWords& bag,
   std::erase_if(found, [&](const Place& place) {
     return static_cast<double>(place.num_common_words) < min_common_share * static_cast<double>(most_common);
   });
-  std::sort(found.begin(), found.end(), [](const Place& a, const Place& b) {
-    return a.score != b.score ? a.score > b.score : a.id < b.id;
-  });
+  std::sort(found.begin(), found.end(),
+            [](const Place& a, const Place& b) { return a.score != b.score ? a.score > b.score : a.id < b.id; });
   return found;
 }
 

@@ -19,9 +19,9 @@ struct VocabularyTree {
 
   std::vector<uint8_t> num_children;  // of each node; 0: it is a word
   std::vector<Descriptor> centers;    // of each node; the root's is not used
-  std::vector<float> idf;             // of each word, in the order of their nodes: ln(images / images that hold the word)
-  int32_t direct_level = 0;           // the level of the direct index; the root is level 0
-  std::string origin;                 // for people: what it was trained on, and how
+  std::vector<float> idf;    // of each word, in the order of their nodes: ln(images / images that hold the word)
+  int32_t direct_level = 0;  // the level of the direct index; the root is level 0
+  std::string origin;        // for people: what it was trained on, and how
 
   bool operator==(const VocabularyTree&) const = default;
   // Empty if the numbers fit together, else one sentence.

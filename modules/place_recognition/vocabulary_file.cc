@@ -1,8 +1,8 @@
 // Vocabularies on disk. All numbers least significant byte first:
 //
-//   "tessera vocabulary\n", version (4), num_nodes (4), num_words (4), direct_level (4), length of the origin (4), origin,
-//   number of children of each node (1), centre of each node (4 x 8), weight of each word (float, 4),
-//   SHA-256 of all that in 64 hexadecimal digits.
+//   "tessera vocabulary\n", version (4), num_nodes (4), num_words (4), direct_level (4), length of the origin (4),
+//   origin, number of children of each node (1), centre of each node (4 x 8), weight of each word (float, 4), SHA-256
+//   of all that in 64 hexadecimal digits.
 #include <bit>
 #include <cstring>
 #include <filesystem>
@@ -111,8 +111,8 @@ struct Header {
 
   // Of the whole file.
   size_t num_bytes() const {
-    return kHeaderBytes + origin_bytes + num_nodes * (sizeof(uint8_t) + sizeof(Descriptor)) + num_words * sizeof(float) +
-           kDigestBytes;
+    return kHeaderBytes + origin_bytes + num_nodes * (sizeof(uint8_t) + sizeof(Descriptor)) +
+           num_words * sizeof(float) + kDigestBytes;
   }
 };
 

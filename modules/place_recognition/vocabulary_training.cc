@@ -66,7 +66,8 @@ std::vector<int> Join(const std::vector<Descriptor>& members, const Descriptor& 
 
 uint64_t Sum(const std::vector<int>& values) { return std::accumulate(values.begin(), values.end(), uint64_t{0}); }
 
-// At most k centres, all different. Each is the best of a few drawn ones: a single draw often puts two into one cluster.
+// At most k centres, all different. Each is the best of a few drawn ones: a single draw often puts two into one
+// cluster.
 std::vector<Descriptor> ChooseCenters(const std::vector<Descriptor>& members, int k, std::mt19937_64& generator) {
   constexpr int kNumDraws = 4;
   std::vector<Descriptor> centers{members[generator() % members.size()]};
@@ -116,7 +117,8 @@ void MoveCenters(const std::vector<Descriptor>& members, const std::vector<uint8
   }
 }
 
-// The parts of a node, none empty. Members are with the nearest of the centres, as they will be when words are looked up.
+// The parts of a node, none empty. Members are with the nearest of the centres, as they will be when words are looked
+// up.
 std::vector<Cluster> Split(const std::vector<Descriptor>& members, const VocabularyOptions& options,
                            std::mt19937_64& generator) {
   std::vector<Descriptor> centers = ChooseCenters(members, options.num_children, generator);
@@ -163,7 +165,8 @@ std::vector<float> MeasureIdf(const VocabularyTree& tree, const std::vector<std:
 std::string VocabularyOptions::Check() const {
   if (num_children < 2 || num_children > VocabularyTree::kMaxChildren) return "a node must have 2 to 255 children";
   if (num_levels < 1 || num_levels > 10) return "a vocabulary must have 1 to 10 levels";
-  if (direct_level < 0 || direct_level > num_levels) return "the direct index must be in one of the vocabulary's levels";
+  if (direct_level < 0 || direct_level > num_levels)
+    return "the direct index must be in one of the vocabulary's levels";
   if (max_num_iterations < 1) return "a split takes at least one iteration";
   return "";
 }

@@ -40,7 +40,8 @@ std::string NameOf(Kind kind) {
   return "";
 }
 
-// Whether `text` may stand where the default is `default_text`: a text key takes anything, a real one whole numbers too.
+// Whether `text` may stand where the default is `default_text`: a text key takes anything, a real one whole numbers
+// too.
 bool Fits(const std::string& text, const std::string& default_text) {
   const Kind wanted = KindOf(default_text);
   const Kind given = KindOf(text);
@@ -85,9 +86,8 @@ Settings Settings::LoadDefaults(const std::string& path) {
 }
 
 void Settings::OverrideFromFile(const std::string& path) {
-  ForEachValue(path, [&](const std::string& key, const std::string& text) {
-    Replace(key, text, "settings file " + path);
-  });
+  ForEachValue(path,
+               [&](const std::string& key, const std::string& text) { Replace(key, text, "settings file " + path); });
 }
 
 void Settings::Override(const std::string& assignment) {

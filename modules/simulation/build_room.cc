@@ -12,7 +12,8 @@ class RoomBuilder {
 
   void Build() {
     BuildShell();
-    const Eigen::Vector2d corners[] = {{-half_x_, -half_z_}, {-half_x_, half_z_}, {half_x_, half_z_}, {half_x_, -half_z_}};
+    const Eigen::Vector2d corners[] = {
+        {-half_x_, -half_z_}, {-half_x_, half_z_}, {half_x_, half_z_}, {half_x_, -half_z_}};
     for (int i = 0; i < 4; ++i) {
       Furnish(corners[i], corners[(i + 1) % 4]);
     }
@@ -38,7 +39,11 @@ class RoomBuilder {
     wall(c, d);
     wall(d, a);
     builder_.Add({{-x, 0.0, -z}, {2 * x, 0.0, 0.0}, {0.0, 0.0, 2 * z}, Paint(Material::kWood, 2 * x, 2 * z), 0.9F});
-    builder_.Add({{-x, -height_, z}, {2 * x, 0.0, 0.0}, {0.0, 0.0, -2 * z}, Paint(Material::kCeiling, 2 * x, 2 * z, 0.02), 0.95F});
+    builder_.Add({{-x, -height_, z},
+                  {2 * x, 0.0, 0.0},
+                  {0.0, 0.0, -2 * z},
+                  Paint(Material::kCeiling, 2 * x, 2 * z, 0.02),
+                  0.95F});
   }
 
   // Shelves, cupboards and boxes along the wall from `from` to `to`, posters and shelves of books above.
@@ -65,8 +70,8 @@ class RoomBuilder {
     }
   }
 
-  void PutCupboard(const Eigen::Vector2d& at_wall, const Eigen::Vector2d& along, const Eigen::Vector2d& inwards, double width,
-                   double height, Material front) {
+  void PutCupboard(const Eigen::Vector2d& at_wall, const Eigen::Vector2d& along, const Eigen::Vector2d& inwards,
+                   double width, double height, Material front) {
     const double depth = random_.Uniform(0.3, 0.5);
     const Eigen::Vector2d middle = at_wall + 0.5 * depth * inwards;
     const int32_t face = Paint(front, width, height);
@@ -91,11 +96,13 @@ class RoomBuilder {
     const Eigen::Vector2d along(1.0, 0.0);
     const int32_t edge = Paint(Material::kWood, 2.0 * half_length, 0.74);
     builder_.Add(builder_.Box(middle, along, half_length, half_width, 0.0, 0.74, edge, edge));
-    builder_.Add(builder_.Lid(middle, along, half_length, half_width, 0.74, Paint(Material::kPoster, 2.0 * half_width, 2.0 * half_length)));
+    builder_.Add(builder_.Lid(middle, along, half_length, half_width, 0.74,
+                              Paint(Material::kPoster, 2.0 * half_width, 2.0 * half_length)));
     PutThings(middle, 0.74, 0.3, along);
   }
 
-  void Hang(const Eigen::Vector2d& at_wall, const Eigen::Vector2d& along, const Eigen::Vector2d& inwards, double width) {
+  void Hang(const Eigen::Vector2d& at_wall, const Eigen::Vector2d& along, const Eigen::Vector2d& inwards,
+            double width) {
     const double height = random_.Uniform(0.4, 0.9);
     const double bottom = random_.Uniform(1.1, 1.4);
     const Eigen::Vector2d middle = at_wall + 0.015 * inwards;

@@ -47,7 +47,8 @@ class StreetBuilder {
 
   // Whether a rectangle is off all streets and other houses: every corner and middle of an edge at least `gap_m` from
   // the middle of any street.
-  bool IsFree(const Eigen::Vector2d& middle, const Eigen::Vector2d& along, double half_along, double half_out, double gap_m) const {
+  bool IsFree(const Eigen::Vector2d& middle, const Eigen::Vector2d& along, double half_along, double half_out,
+              double gap_m) const {
     for (int i = -2; i <= 2; ++i) {
       for (int k = -2; k <= 2; ++k) {
         const Eigen::Vector2d p = middle + 0.5 * i * half_along * along + 0.5 * k * half_out * RightOf(along);
@@ -56,8 +57,8 @@ class StreetBuilder {
     }
     const double radius = std::hypot(half_along, half_out);
     return std::none_of(houses_.begin(), houses_.end(), [&](const House& house) {
-      return (house.middle - middle).norm() < 0.9 * std::max(std::min(half_along, half_out), house.inner) +
-                                                  0.5 * std::min(radius, house.outer);
+      return (house.middle - middle).norm() <
+             0.9 * std::max(std::min(half_along, half_out), house.inner) + 0.5 * std::min(radius, house.outer);
     });
   }
 
@@ -125,7 +126,8 @@ class StreetBuilder {
       const Spot next = SpotAt(posts, i + 1, side);
       const Eigen::Vector2d a = here.on_middle + kKerbM * here.out;
       const Eigen::Vector2d b = next.on_middle + kKerbM * next.out;
-      if (world_.streets->DistanceToStreet(a) < kKerbM - 0.1 || world_.streets->DistanceToStreet(b) < kKerbM - 0.1) continue;
+      if (world_.streets->DistanceToStreet(a) < kKerbM - 0.1 || world_.streets->DistanceToStreet(b) < kKerbM - 0.1)
+        continue;
       const int32_t paint = builder_.AddPaint({Material::kKerb, random_.Next(), 4.0, 0.13, 0.02});
       // Seen from the road, whose side is left of `along`.
       builder_.Add(side > 0.0 ? builder_.Wall(b, a, 0.0, 0.13, paint) : builder_.Wall(a, b, 0.0, 0.13, paint));
@@ -159,7 +161,8 @@ class StreetBuilder {
     const int32_t bark = builder_.AddPaint({Material::kBark, random_.Next(), 2.0 * thick, trunk + 0.5 * crown, 0.02});
     builder_.Add(builder_.Box(foot, {1.0, 0.0}, thick, thick, 0.0, trunk + 0.5 * crown, bark, bark));
     // Three planes through the trunk.
-    for (const Eigen::Vector2d& across : {Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d(-0.5, 0.866), Eigen::Vector2d(-0.5, -0.866)}) {
+    for (const Eigen::Vector2d& across :
+         {Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d(-0.5, 0.866), Eigen::Vector2d(-0.5, -0.866)}) {
       const int32_t leaves = builder_.AddPaint({Material::kFoliage, random_.Next(), crown, crown, 0.04});
       Surface surface = builder_.Wall(foot - 0.5 * crown * across, foot + 0.5 * crown * across, trunk, crown, leaves);
       surface.two_sided = true;
@@ -174,8 +177,8 @@ class StreetBuilder {
     const double half = random_.Uniform(0.25, 0.5);
     const double tall = random_.Uniform(0.4, 0.8);
     const int32_t sign = builder_.AddPaint({Material::kSign, random_.Next(), 2.0 * half, tall, 0.01});
-    Surface board = builder_.Wall(foot - half * spot.out + 0.07 * spot.along, foot + half * spot.out + 0.07 * spot.along,
-                                  std::min(2.0, height - tall), tall, sign);
+    Surface board = builder_.Wall(foot - half * spot.out + 0.07 * spot.along,
+                                  foot + half * spot.out + 0.07 * spot.along, std::min(2.0, height - tall), tall, sign);
     board.two_sided = true;
     builder_.Add(board);
   }
@@ -185,7 +188,8 @@ class StreetBuilder {
     if (!IsFree(middle, spot.along, half, 0.3, kLotLineM - 0.3)) return;
     const bool is_hedge = random_.Chance(0.5);
     const double height = random_.Uniform(0.8, 1.7);
-    const int32_t paint = builder_.AddPaint({is_hedge ? Material::kHedge : Material::kFence, random_.Next(), 2.0 * half, height, 0.02});
+    const int32_t paint =
+        builder_.AddPaint({is_hedge ? Material::kHedge : Material::kFence, random_.Next(), 2.0 * half, height, 0.02});
     builder_.Add(builder_.Box(middle, spot.along, half, is_hedge ? 0.3 : 0.04, 0.0, height, paint, paint));
   }
 
@@ -221,14 +225,16 @@ class StreetBuilder {
         const Eigen::Vector2d middle = corner + Eigen::Vector2d::Constant(0.5 * kTileM);
         if (world_.streets->DistanceToStreet(middle) > 18.0) continue;
         const PaintSpec spec{Material::kGround, HashOf(seed_, 5), kTileM, kTileM, 0.025, corner};
-        builder_.Add({{corner.x(), 0.0, corner.y()}, {kTileM, 0.0, 0.0}, {0.0, 0.0, kTileM}, builder_.AddPaint(spec), 0.95F});
+        builder_.Add(
+            {{corner.x(), 0.0, corner.y()}, {kTileM, 0.0, 0.0}, {0.0, 0.0, kTileM}, builder_.AddPaint(spec), 0.95F});
       }
     }
     const Eigen::Vector2d corner = low - Eigen::Vector2d::Constant(200.0);
     const Eigen::Vector2d extent = high - low + Eigen::Vector2d::Constant(400.0);
     const int32_t grass = builder_.AddPaint({Material::kHedge, HashOf(seed_, 4), extent.x(), extent.y(), 0.5});
     // A little deeper, so that the tiles hide it.
-    world_.far.push_back({{corner.x(), 0.05, corner.y()}, {extent.x(), 0.0, 0.0}, {0.0, 0.0, extent.y()}, grass, 0.95F});
+    world_.far.push_back(
+        {{corner.x(), 0.05, corner.y()}, {extent.x(), 0.0, 0.0}, {0.0, 0.0, extent.y()}, grass, 0.95F});
   }
 
   void BuildSkyline() {
@@ -239,7 +245,11 @@ class StreetBuilder {
     const double sky_m = 4000.0;
     const int32_t clouds = builder_.AddPaint({Material::kSky, HashOf(seed_, 6), 2.0 * sky_m, 2.0 * sky_m, 8.0});
     // Seen from below: across to the right when looking up along z.
-    world_.far.push_back({{middle.x() - sky_m, -350.0, middle.y() + sky_m}, {2.0 * sky_m, 0.0, 0.0}, {0.0, 0.0, -2.0 * sky_m}, clouds, 1.0F});
+    world_.far.push_back({{middle.x() - sky_m, -350.0, middle.y() + sky_m},
+                          {2.0 * sky_m, 0.0, 0.0},
+                          {0.0, 0.0, -2.0 * sky_m},
+                          clouds,
+                          1.0F});
     constexpr int kNumBlocks = 90;
     for (int i = 0; i < kNumBlocks; ++i) {
       // Directions around the circle by an exact rational parametrisation of each quarter.
@@ -252,7 +262,8 @@ class StreetBuilder {
       const double half = random_.Uniform(8.0, 30.0);
       const double height = random_.Uniform(10.0, 60.0);
       const int32_t paint = builder_.AddPaint({Material::kSkyline, random_.Next(), 2.0 * half, height, 0.3});
-      const std::vector<Surface> block = builder_.Box(middle + distance * out, out, half, half, 0.0, height, paint, paint);
+      const std::vector<Surface> block =
+          builder_.Box(middle + distance * out, out, half, half, 0.0, height, paint, paint);
       world_.far.insert(world_.far.end(), block.begin(), block.end());
     }
   }

@@ -9,8 +9,8 @@
 namespace tessera {
 namespace {
 
-constexpr int kMaxTaps = 9;        // samples along the motion of one pixel
-constexpr float kMinBlurPx = 0.6F; // shorter motion can't be seen
+constexpr int kMaxTaps = 9;         // samples along the motion of one pixel
+constexpr float kMinBlurPx = 0.6F;  // shorter motion can't be seen
 
 // About normal, standard deviation 1: the sum of a hash's four bytes, whose deviation is sqrt(4 (256^2 - 1) / 12).
 float NormalOf(uint32_t hash) {
@@ -98,15 +98,17 @@ void EffectsPipeline::Spread() {
   }
 }
 
-GrayImage EffectsPipeline::Apply(const Rendering& rendering, const CameraVelocity& velocity, double time_s, uint32_t picture) {
+GrayImage EffectsPipeline::Apply(const Rendering& rendering, const CameraVelocity& velocity, double time_s,
+                                 uint32_t picture) {
   BlurMotion(rendering, velocity);
   Spread();
-  const double drift = 0.7 * SmoothNoise(HashOf(seed_, 31), 0.15 * time_s) + 0.3 * SmoothNoise(HashOf(seed_, 32), 0.8 * time_s);
+  const double drift =
+      0.7 * SmoothNoise(HashOf(seed_, 31), 0.15 * time_s) + 0.3 * SmoothNoise(HashOf(seed_, 32), 0.8 * time_s);
   const auto gain = static_cast<float>((1.0 + effects_.exposure_drift * drift) / 256.0);
   std::array<float, 256> sigma{};
   for (size_t grey = 0; grey < sigma.size(); ++grey) {
-    sigma[grey] = static_cast<float>(std::sqrt(effects_.read_noise * effects_.read_noise +
-                                               effects_.shot_noise * static_cast<double>(grey)));
+    sigma[grey] = static_cast<float>(
+        std::sqrt(effects_.read_noise * effects_.read_noise + effects_.shot_noise * static_cast<double>(grey)));
   }
   GrayImage image(camera_.width_px, camera_.height_px);
   for (int y = 0; y < image.height; ++y) {
@@ -133,7 +135,8 @@ DepthImage EffectsPipeline::Depth(const Rendering& rendering, uint32_t picture) 
       const float w = rendering.inverse_depth.row(y)[x];
       if (w <= 0.0F) continue;
       const float z = 1.0F / w;
-      const float counts = (z + deviation * z * z * NormalOf(PixelHash(row_seed, static_cast<uint32_t>(x)))) * counts_per_m + 0.5F;
+      const float counts =
+          (z + deviation * z * z * NormalOf(PixelHash(row_seed, static_cast<uint32_t>(x)))) * counts_per_m + 0.5F;
       if (counts >= 1.0F && counts < 65536.0F) depth.row(y)[x] = static_cast<uint16_t>(counts);
     }
   }

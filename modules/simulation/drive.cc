@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kStepM = 0.25;
 constexpr double kCruiseMps = 8.0;
-constexpr double kLaneM = 1.75;         // from the street's middle to the middle of the right lane
-constexpr double kCornerM = 14.0;       // where a bend at a crossing begins
+constexpr double kLaneM = 1.75;    // from the street's middle to the middle of the right lane
+constexpr double kCornerM = 14.0;  // where a bend at a crossing begins
 constexpr double kCameraHeightM = 1.65;
 constexpr double kSideAccelerationMps2 = 2.2;
 constexpr double kAccelerationMps2 = 1.6;
@@ -237,7 +237,8 @@ Rigid3 HandTrajectory::WorldFromCamera(double time_s) const {
   const double round = speed_ * time_s / 20.0;  // one round takes 20 s
   const double shift = static_cast<double>(UnitOf(HashOf(seed_, 1)));
   const auto tremor = [&](uint32_t axis) {
-    return 0.012 * SmoothNoise(HashOf(seed_, axis), 1.3 * time_s) + 0.003 * SmoothNoise(HashOf(seed_, axis, 1), 5.0 * time_s);
+    return 0.012 * SmoothNoise(HashOf(seed_, axis), 1.3 * time_s) +
+           0.003 * SmoothNoise(HashOf(seed_, axis, 1), 5.0 * time_s);
   };
   const Eigen::Vector3d position(0.2 * room_m_.x() * Wave(round + shift) + tremor(2),
                                  -1.45 + 0.15 * Wave(2.0 * round) + tremor(3),

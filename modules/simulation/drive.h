@@ -46,8 +46,8 @@ class CarTrajectory : public Trajectory {
   double DistanceAt(double time_s) const;
   Eigen::Vector2d PointAt(double distance_m) const;
 
-  Polyline points_;             // every kStepM
-  std::vector<double> times_s_; // by point
+  Polyline points_;              // every kStepM
+  std::vector<double> times_s_;  // by point
   uint32_t seed_;
 };
 

@@ -14,27 +14,45 @@ Texture PaintPlain(const PaintSpec& spec, double tone, double fine, double coars
 Texture Paint(const PaintSpec& spec, const StreetMap* map) {
   const double tone = static_cast<double>(UnitOf(HashOf(spec.seed, 3)));
   switch (spec.material) {
-    case Material::kFacade: return PaintFacade(spec);
+    case Material::kFacade:
+      return PaintFacade(spec);
     case Material::kGround:
       if (map == nullptr) throw std::invalid_argument("ground needs a street map");
       return PaintGround(spec, *map);
-    case Material::kKerb: return PaintPlain(spec, 150.0, 14.0, 14.0);
-    case Material::kFoliage: return PaintFoliage(spec);
-    case Material::kBark: return PaintPlain(spec, 60.0, 26.0, 18.0);
-    case Material::kHedge: return PaintPlain(spec, 55.0 + 30.0 * tone, 42.0, 16.0);
-    case Material::kFence: return PaintFence(spec);
-    case Material::kCarSide: return PaintCarSide(spec);
-    case Material::kCarEnd: return PaintCarEnd(spec);
-    case Material::kCarRoof: return PaintPlain(spec, 40.0 + 180.0 * tone, 2.0, 6.0);
-    case Material::kSign: return PaintSign(spec);
-    case Material::kSky: return PaintSky(spec);
-    case Material::kSkyline: return PaintSkyline(spec);
-    case Material::kWallpaper: return PaintWallpaper(spec);
-    case Material::kPoster: return PaintPoster(spec);
-    case Material::kBooks: return PaintBooks(spec);
-    case Material::kWood: return PaintWood(spec);
-    case Material::kCarpet: return PaintPlain(spec, 70.0 + 60.0 * tone, 30.0, 20.0);
-    case Material::kCeiling: return PaintPlain(spec, 205.0, 3.0, 8.0);
+    case Material::kKerb:
+      return PaintPlain(spec, 150.0, 14.0, 14.0);
+    case Material::kFoliage:
+      return PaintFoliage(spec);
+    case Material::kBark:
+      return PaintPlain(spec, 60.0, 26.0, 18.0);
+    case Material::kHedge:
+      return PaintPlain(spec, 55.0 + 30.0 * tone, 42.0, 16.0);
+    case Material::kFence:
+      return PaintFence(spec);
+    case Material::kCarSide:
+      return PaintCarSide(spec);
+    case Material::kCarEnd:
+      return PaintCarEnd(spec);
+    case Material::kCarRoof:
+      return PaintPlain(spec, 40.0 + 180.0 * tone, 2.0, 6.0);
+    case Material::kSign:
+      return PaintSign(spec);
+    case Material::kSky:
+      return PaintSky(spec);
+    case Material::kSkyline:
+      return PaintSkyline(spec);
+    case Material::kWallpaper:
+      return PaintWallpaper(spec);
+    case Material::kPoster:
+      return PaintPoster(spec);
+    case Material::kBooks:
+      return PaintBooks(spec);
+    case Material::kWood:
+      return PaintWood(spec);
+    case Material::kCarpet:
+      return PaintPlain(spec, 70.0 + 60.0 * tone, 30.0, 20.0);
+    case Material::kCeiling:
+      return PaintPlain(spec, 205.0, 3.0, 8.0);
   }
   throw std::invalid_argument("unknown material");
 }

@@ -11,10 +11,10 @@ namespace tessera {
 class StreetMap;
 
 enum class Material {
-  kFacade,    // windows, doors, shop fronts; plaster or brick
-  kGround,    // road, kerb, pavement and grass, as the street map says for `origin`
+  kFacade,  // windows, doors, shop fronts; plaster or brick
+  kGround,  // road, kerb, pavement and grass, as the street map says for `origin`
   kKerb,
-  kFoliage,   // leaves with holes between them
+  kFoliage,  // leaves with holes between them
   kBark,
   kHedge,
   kFence,
@@ -23,7 +23,7 @@ enum class Material {
   kCarRoof,
   kSign,
   kSky,
-  kSkyline,   // far buildings
+  kSkyline,  // far buildings
   kWallpaper,
   kPoster,
   kBooks,
@@ -35,7 +35,7 @@ enum class Material {
 struct PaintSpec {
   Material material = Material::kFacade;
   uint32_t seed = 0;
-  double width_m = 1.0;   // extent of the surface
+  double width_m = 1.0;  // extent of the surface
   double height_m = 1.0;
   double texel_m = 0.02;
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // kGround: world x, z of the bottom left corner, m

@@ -84,7 +84,9 @@ void PaintTraces(const FacadeStyle& style, Canvas& canvas) {
     const double x = random.Uniform(0.0, canvas.width_m() - 0.5);
     const double y = random.Uniform(0.2, 2.6);
     switch (random.Index(4)) {
-      case 0: canvas.Fill({x, 0.0, 0.12, canvas.height_m()}, style.wall_tone - 45.0); break;
+      case 0:
+        canvas.Fill({x, 0.0, 0.12, canvas.height_m()}, style.wall_tone - 45.0);
+        break;
       case 1: {
         const double tone = random.Uniform(40.0, 230.0);
         canvas.Fill({x, y, random.Uniform(0.3, 0.8), random.Uniform(0.3, 0.9)}, tone);
@@ -95,7 +97,9 @@ void PaintTraces(const FacadeStyle& style, Canvas& canvas) {
         canvas.Fill({x, y, random.Uniform(0.6, 2.0), random.Uniform(0.4, 1.5)}, tone, {5.0, 6.0});
         break;
       }
-      default: canvas.Scribble({x, y, 1.6, 0.5}, 0.42, random.Uniform(20.0, 240.0)); break;
+      default:
+        canvas.Scribble({x, y, 1.6, 0.5}, 0.42, random.Uniform(20.0, 240.0));
+        break;
     }
   }
 }

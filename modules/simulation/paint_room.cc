@@ -10,7 +10,7 @@ Texture PaintWallpaper(const PaintSpec& spec) {
   Random random(HashOf(spec.seed, 21));
   const double tone = random.Uniform(140.0, 195.0);
   Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, tone, {5.0, 14.0});
-  canvas.Fill({0.0, 0.0, spec.width_m, 0.1}, tone - 70.0);  // skirting board
+  canvas.Fill({0.0, 0.0, spec.width_m, 0.1}, tone - 70.0);          // skirting board
   for (int i = 0; i < static_cast<int>(2.0 * spec.width_m); ++i) {  // switches, sockets, hooks, notes
     const double size = random.Uniform(0.05, 0.2);
     const double thing_tone = random.Uniform(30.0, 240.0);
@@ -28,8 +28,8 @@ Texture PaintPoster(const PaintSpec& spec) {
     const double width = random.Uniform(0.1, 0.5) * spec.width_m;
     const double height = random.Uniform(0.05, 0.4) * spec.height_m;
     const double tone = random.Uniform(20.0, 240.0);
-    canvas.Fill({random.Uniform(0.0, spec.width_m - width), random.Uniform(0.0, spec.height_m - height), width, height}, tone,
-                {8.0, 20.0});
+    canvas.Fill({random.Uniform(0.0, spec.width_m - width), random.Uniform(0.0, spec.height_m - height), width, height},
+                tone, {8.0, 20.0});
   }
   canvas.Scribble({0.1 * spec.width_m, 0.08 * spec.height_m, 0.8 * spec.width_m, 0.2 * spec.height_m},
                   0.06 * spec.width_m, 20.0);

@@ -34,7 +34,8 @@ bool IsPaintedLine(const StreetPlace& place) {
 double PavementTone(const StreetPlace& place, uint32_t seed, int x, int y) {
   const auto slab = HashOf(static_cast<uint32_t>(static_cast<int>(std::floor(place.along_m / 0.6))),
                            static_cast<uint32_t>(static_cast<int>(std::floor(place.lateral_m / 0.6))));
-  const bool is_joint = ToNearestMultiple(place.along_m, 0.6) < 0.015 || ToNearestMultiple(place.lateral_m, 0.6) < 0.015;
+  const bool is_joint =
+      ToNearestMultiple(place.along_m, 0.6) < 0.015 || ToNearestMultiple(place.lateral_m, 0.6) < 0.015;
   return (is_joint ? 92.0 : 138.0) + 16.0 * static_cast<double>(UnitOf(slab)) +
          12.0 * static_cast<double>(SpeckleAt(seed, x, y)) + 10.0 * static_cast<double>(StainAt(seed, x, y));
 }

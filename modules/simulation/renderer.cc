@@ -130,7 +130,8 @@ void Drawer::DrawRow(const Plane& plane, const Surface& surface, const Texture& 
     const float a_mid = (a_row.at_zero + x_mid * a_row.by_x) * z_mid;
     const float b_mid = (b_row.at_zero + x_mid * b_row.by_x) * z_mid;
     const auto square = [](float v) { return v * v; };
-    const float by_x = square((a_row.by_x - a_mid * w_row.by_x) * z_mid) + square((b_row.by_x - b_mid * w_row.by_x) * z_mid);
+    const float by_x =
+        square((a_row.by_x - a_mid * w_row.by_x) * z_mid) + square((b_row.by_x - b_mid * w_row.by_x) * z_mid);
     const float by_y = square((a_by_y - a_mid * w_by_y) * z_mid) + square((b_by_y - b_mid * w_by_y) * z_mid);
     // Between the two: the larger alone would blur what is seen at a flat angle.
     const float covered = std::clamp(std::sqrt(by_x * by_y) * 0.7F + 0.3F * std::max(by_x, by_y), 1e-12F, 1e12F);
@@ -191,7 +192,8 @@ Surface InCamera(const Rigid3& camera_from_world, Surface surface) {
 
 // Whether part of the surface, in the camera's frame, can lie inside the picture.
 bool IsInSight(const Surface& surface, const CameraCalibration& camera) {
-  if (!surface.two_sided && surface.across.cross(surface.up).dot(surface.corner) >= 0.0) return false;  // seen from behind
+  if (!surface.two_sided && surface.across.cross(surface.up).dot(surface.corner) >= 0.0)
+    return false;  // seen from behind
   // Planes through the eye and the picture's borders: all four corners beyond one of them can't be seen.
   const double left = -camera.cx_px / camera.fx_px, right = (camera.width_px - camera.cx_px) / camera.fx_px;
   const double top = -camera.cy_px / camera.fy_px, bottom = (camera.height_px - camera.cy_px) / camera.fy_px;
@@ -231,7 +233,8 @@ std::optional<std::vector<Surface>> PlaceCar(const MovingCar& car, double time_s
 
 }  // namespace
 
-PaintStore::PaintStore(std::shared_ptr<const World> world) : world_(std::move(world)), entries_(world_->paints.size()) {}
+PaintStore::PaintStore(std::shared_ptr<const World> world)
+    : world_(std::move(world)), entries_(world_->paints.size()) {}
 
 const Texture& PaintStore::Get(int32_t paint) {
   std::unique_ptr<Entry>& entry = entries_[static_cast<size_t>(paint)];

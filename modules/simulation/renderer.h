@@ -1,4 +1,5 @@
-// Draws a world as a pinhole camera sees it, with the depth of each pixel. One thread; float arithmetic in a fixed order.
+// Draws a world as a pinhole camera sees it, with the depth of each pixel. One thread; float arithmetic in a fixed
+// order.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +13,8 @@
 
 namespace tessera {
 
-using RadianceImage = Image<uint16_t>;      // grey values times 256: light that reaches a pixel
-using InverseDepthImage = Image<float>;     // 1 / z of the surface in the middle of the pixel, 1/m; 0: nothing there
+using RadianceImage = Image<uint16_t>;   // grey values times 256: light that reaches a pixel
+using InverseDepthImage = Image<float>;  // 1 / z of the surface in the middle of the pixel, 1/m; 0: nothing there
 
 struct Rendering {
   RadianceImage radiance;
@@ -52,8 +53,8 @@ class Renderer {
  private:
   struct Visible {
     double distance_m;
-    size_t order;  // ties
-    Surface surface;    // in the camera's frame
+    size_t order;     // ties
+    Surface surface;  // in the camera's frame
   };
   void Collect(const CameraCalibration& camera, const Rigid3& camera_from_world, double time_s);
 

@@ -45,7 +45,8 @@ CameraEffects MakeEffects(const SimulationOptions& options) {
 
 StreetPlan MakePlan(const SimulationOptions& options) {
   if (!options.path.empty()) return PlanFromPoses(options.path, options.length_m);
-  return options.scene == Scene::kStreet ? PlanTown(options.seed, options.length_m) : PlanRound(options.seed, options.length_m);
+  return options.scene == Scene::kStreet ? PlanTown(options.seed, options.length_m)
+                                         : PlanRound(options.seed, options.length_m);
 }
 
 double ParseNumber(const std::string& key, const std::string& text) {
@@ -63,15 +64,18 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
     return;
   }
   const double number = ParseNumber(key, value);
-  const std::map<std::string, double*> numbers{{"length", &options.length_m}, {"duration", &options.duration_s},
-                                               {"speed", &options.speed},     {"noise", &options.noise},
+  const std::map<std::string, double*> numbers{{"length", &options.length_m},
+                                               {"duration", &options.duration_s},
+                                               {"speed", &options.speed},
+                                               {"noise", &options.noise},
                                                {"scale", &options.scale}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
     options.seed = static_cast<uint32_t>(number);
   } else {
-    throw InputError("sim: `" + key + "=" + value + "` is unknown or out of range: give seed, length (m), duration (s), speed, "
+    throw InputError("sim: `" + key + "=" + value +
+                     "` is unknown or out of range: give seed, length (m), duration (s), speed, "
                      "noise, scale or path");
   }
 }
@@ -90,9 +94,11 @@ std::string SimulationOptions::Check() const {
 SimulationOptions ParseSimulation(const std::string& text) {
   SimulationOptions options;
   const std::string name = text.substr(0, text.find(','));
-  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort}, {"room", Scene::kRoom}};
+  const std::map<std::string, Scene> scenes{
+      {"street", Scene::kStreet}, {"street-short", Scene::kStreetShort}, {"room", Scene::kRoom}};
   const auto scene = scenes.find(name);
-  if (scene == scenes.end()) throw InputError("sim:" + name + " is unknown: give sim:street, sim:street-short or sim:room");
+  if (scene == scenes.end())
+    throw InputError("sim:" + name + " is unknown: give sim:street, sim:street-short or sim:room");
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
     const size_t end = std::min(text.find(',', begin + 1), text.size());

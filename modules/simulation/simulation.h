@@ -15,13 +15,13 @@ namespace tessera {
 struct SimulationOptions {
   enum class Scene { kStreet, kStreetShort, kRoom };
   Scene scene = Scene::kStreet;
-  uint32_t seed = 1;       // another seed, another town
-  double length_m = 0.0;   // of a drive; 0: all of it
+  uint32_t seed = 1;         // another seed, another town
+  double length_m = 0.0;     // of a drive; 0: all of it
   double duration_s = 20.0;  // of a walk in the room
-  double speed = 1.0;      // times the usual
-  double noise = 1.0;      // times the usual noise of sensors
-  double scale = 1.0;      // times the usual size of images
-  std::string path;        // a drive along the poses of a KITTI file instead of through the town
+  double speed = 1.0;        // times the usual
+  double noise = 1.0;        // times the usual noise of sensors
+  double scale = 1.0;        // times the usual size of images
+  std::string path;          // a drive along the poses of a KITTI file instead of through the town
 
   // Empty if all is well, else one sentence.
   std::string Check() const;

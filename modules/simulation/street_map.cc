@@ -53,7 +53,9 @@ StreetMap::StreetMap(const std::vector<Polyline>& streets) {
     const Eigen::Vector2d to = segment.from + segment.length_m * segment.direction;
     const Eigen::Vector2d first = (segment.from.cwiseMin(to) - origin_).array() - kReachM;
     const Eigen::Vector2d last = (segment.from.cwiseMax(to) - origin_).array() + kReachM;
-    const auto cell_of = [](double offset, int num) { return std::clamp(static_cast<int>(offset / kCellM), 0, num - 1); };
+    const auto cell_of = [](double offset, int num) {
+      return std::clamp(static_cast<int>(offset / kCellM), 0, num - 1);
+    };
     for (int row = cell_of(first.y(), num_rows_); row <= cell_of(last.y(), num_rows_); ++row) {
       for (int column = cell_of(first.x(), num_columns_); column <= cell_of(last.x(), num_columns_); ++column) {
         cells_[static_cast<size_t>(row * num_columns_ + column)].push_back(static_cast<int32_t>(i));

@@ -27,21 +27,25 @@ Surface WorldBuilder::Wall(const Eigen::Vector2d& from, const Eigen::Vector2d& t
   const Eigen::Vector2d along = to - from;
   // Who sees `from` on the left stands to the right of the way from `from` to `to`.
   const Eigen::Vector2d normal = RightOf(along.normalized());
-  return {OnGround(from, bottom_m), {along.x(), 0.0, along.y()}, {0.0, -height_m, 0.0}, paint,
+  return {OnGround(from, bottom_m),
+          {along.x(), 0.0, along.y()},
+          {0.0, -height_m, 0.0},
+          paint,
           BrightnessOf({normal.x(), 0.0, normal.y()})};
 }
 
-std::vector<Surface> WorldBuilder::Box(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, double half_length_m,
-                                       double half_width_m, double bottom_m, double height_m, int32_t sides,
-                                       int32_t ends) const {
+std::vector<Surface> WorldBuilder::Box(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead,
+                                       double half_length_m, double half_width_m, double bottom_m, double height_m,
+                                       int32_t sides, int32_t ends) const {
   const Eigen::Vector2d length = half_length_m * ahead;
   const Eigen::Vector2d width = half_width_m * RightOf(ahead);
   const Eigen::Vector2d front_right = middle + length + width;
   const Eigen::Vector2d front_left = middle + length - width;
   const Eigen::Vector2d back_right = middle - length + width;
   const Eigen::Vector2d back_left = middle - length - width;
-  return {Wall(back_right, front_right, bottom_m, height_m, sides), Wall(front_right, front_left, bottom_m, height_m, ends),
-          Wall(front_left, back_left, bottom_m, height_m, sides), Wall(back_left, back_right, bottom_m, height_m, ends)};
+  return {
+      Wall(back_right, front_right, bottom_m, height_m, sides), Wall(front_right, front_left, bottom_m, height_m, ends),
+      Wall(front_left, back_left, bottom_m, height_m, sides), Wall(back_left, back_right, bottom_m, height_m, ends)};
 }
 
 Surface WorldBuilder::Lid(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, double half_length_m,
@@ -68,8 +72,9 @@ std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector
   };
   const int32_t roof = paint(Material::kCarRoof, width, length);
   const int32_t glass = builder.AddPaint({Material::kCarEnd, seed + 1, 2.0, cabin_height, 0.02});
-  std::vector<Surface> car = builder.Box(middle, ahead, 0.5 * length, 0.5 * width, 0.0, height,
-                                         paint(Material::kCarSide, length, height), paint(Material::kCarEnd, width, height));
+  std::vector<Surface> car =
+      builder.Box(middle, ahead, 0.5 * length, 0.5 * width, 0.0, height, paint(Material::kCarSide, length, height),
+                  paint(Material::kCarEnd, width, height));
   car.push_back(builder.Lid(middle, ahead, 0.5 * length, 0.5 * width, height, roof));
   const Eigen::Vector2d cabin = middle - 0.08 * length * ahead;
   const std::vector<Surface> walls =

@@ -19,19 +19,21 @@ struct Surface {
   Eigen::Vector3d corner;
   Eigen::Vector3d across;
   Eigen::Vector3d up;
-  int32_t paint = 0;          // index into World::paints
-  float brightness = 1.0F;    // of the light that falls on it
+  int32_t paint = 0;        // index into World::paints
+  float brightness = 1.0F;  // of the light that falls on it
   bool two_sided = false;
 
   Eigen::Vector3d Centre() const { return corner + 0.5 * (across + up); }
   // In the order of its outline.
-  std::array<Eigen::Vector3d, 4> Corners() const { return {corner, corner + across, corner + across + up, corner + up}; }
+  std::array<Eigen::Vector3d, 4> Corners() const {
+    return {corner, corner + across, corner + across + up, corner + up};
+  }
 };
 
 // A car that drives along a line, against the camera's direction.
 struct MovingCar {
-  Polyline way;             // every kCarStepM
-  double start_m = 0.0;     // its place along the way at time 0
+  Polyline way;          // every kCarStepM
+  double start_m = 0.0;  // its place along the way at time 0
   double speed_mps = 0.0;
   std::vector<Surface> body;  // around the origin, facing +z
 };
@@ -53,7 +55,8 @@ class WorldBuilder {
 
   int32_t AddPaint(const PaintSpec& spec);
   // An upright wall from `from` to `to` (seen with `from` on the left), standing on height `bottom_m`.
-  Surface Wall(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double bottom_m, double height_m, int32_t paint) const;
+  Surface Wall(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double bottom_m, double height_m,
+               int32_t paint) const;
   // Four walls around the rectangle with this middle, half sizes along `ahead` and to its right, seen from outside.
   // Paints: of the sides along `ahead`, and of the ends.
   std::vector<Surface> Box(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, double half_length_m,
@@ -70,7 +73,8 @@ class WorldBuilder {
 };
 
 // The body of a parked or driving car in the middle of `middle`, facing `ahead`.
-std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, uint32_t seed, WorldBuilder& builder);
+std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, uint32_t seed,
+                              WorldBuilder& builder);
 
 // Houses, trees, parked and driving cars along the streets; the drive stays free.
 World BuildStreets(const StreetPlan& plan, uint32_t seed);

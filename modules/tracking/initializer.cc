@@ -68,8 +68,8 @@ void MonoInitializer::SetReference(const std::shared_ptr<const FrameView>& frame
   }
 }
 
-MonoStart MonoInitializer::MakeStart(const std::shared_ptr<const FrameView>& frame,
-                                     const std::vector<Match>& matches, const TwoViewResult& views) const {
+MonoStart MonoInitializer::MakeStart(const std::shared_ptr<const FrameView>& frame, const std::vector<Match>& matches,
+                                     const TwoViewResult& views) const {
   MonoStart start{reference_, frame, views.second_from_first, {}};
   for (size_t i = 0; i < matches.size(); ++i) {
     if (!views.points[i]) {

@@ -9,8 +9,8 @@
 
 #include "geometry/triangulation.h"
 #include "geometry/two_view.h"
-#include "tracking/frame_view.h"
-#include "tracking/matching.h"
+#include "matching/matching.h"
+#include "measurement/frame_view.h"
 
 namespace tessera {
 

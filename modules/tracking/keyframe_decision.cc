@@ -54,15 +54,15 @@ KeyframeDecision::Seen KeyframeDecision::See(const TrackedFrame& frame, const Ri
   return seen;
 }
 
-// What is seen falls about linearly from the frame after the reference: share(t) = 1 - slope (t - first), taken one frame
-// ahead.
+// What is seen falls about linearly from the frame after the reference: share(t) = 1 - slope (t - first), taken one
+// frame ahead.
 double KeyframeDecision::NextShare(double share, int64_t utime_us, int64_t frame_interval_us) const {
   const auto elapsed_us = static_cast<double>(std::max<int64_t>(1, utime_us - *first_utime_us_));
   return share - (1.0 - share) * std::min(1.0, static_cast<double>(frame_interval_us) / elapsed_us);
 }
 
-bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_us,
-                              const Rigid3& world_from_reference, const NearKeypoints& near) {
+bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_us, const Rigid3& world_from_reference,
+                              const NearKeypoints& near) {
   Seen seen = See(frame, world_from_reference);
   if (seen.points.empty()) return true;
   const int64_t utime_us = frame.view->features().utime_us;
@@ -72,8 +72,8 @@ bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_
     first_utime_us_ = utime_us;
     points_ = std::move(seen.points);
   }
-  const bool has_lost_sight = is_first ? share < options_.min_first_share
-                                       : NextShare(share, utime_us, frame_interval_us) < options_.min_share;
+  const bool has_lost_sight =
+      is_first ? share < options_.min_first_share : NextShare(share, utime_us, frame_interval_us) < options_.min_share;
   const bool lacks_near = near.num_known < options_.max_known_points && near.num_new > options_.min_new_points;
   const bool has_moved = share < options_.min_still_share;
   const bool is_old = utime_us - utime_us_ > options_.max_interval_us;

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "tracking/point_matching.h"
+#include "matching/point_matching.h"
+#include "tracking/map_replica.h"
 
 namespace tessera {
 
@@ -17,12 +18,13 @@ struct KeyframeDecisionOptions {
   // Of all the reference's points, this share must be found in the frame after it. Corners come and go: a loss of a
   // third from frame to frame is nothing to act on, a greater one is motion.
   double min_first_share = 0.4;
-  double min_parallax_rad = 0.035;  // mono: 2 degrees of median parallax to the reference: new points can be placed well
-  double min_still_share = 0.9;     // few points, parallax or age is no reason while more than this is still seen
-  int min_points = 150;             // a frame that sees fewer known points becomes a keyframe if anything moved
+  double min_parallax_rad =
+      0.035;                     // mono: 2 degrees of median parallax to the reference: new points can be placed well
+  double min_still_share = 0.9;  // few points, parallax or age is no reason while more than this is still seen
+  int min_points = 150;          // a frame that sees fewer known points becomes a keyframe if anything moved
   int64_t max_interval_us = 2000000;  // not longer than this, if anything moved
-  int min_new_points = 70;          // stereo, RGB-D: near keypoints that see no known point ...
-  int max_known_points = 100;       // ... while fewer near keypoints than this see one
+  int min_new_points = 70;            // stereo, RGB-D: near keypoints that see no known point ...
+  int max_known_points = 100;         // ... while fewer near keypoints than this see one
 
   // Empty if all is well, else one sentence.
   std::string Check() const;
@@ -56,8 +58,8 @@ class KeyframeDecision {
   double NextShare(double share, int64_t utime_us, int64_t frame_interval_us) const;
 
   const KeyframeDecisionOptions options_;
-  int64_t utime_us_ = 0;                        // of the reference
-  std::optional<int64_t> first_utime_us_;       // of the frame after it, once that was asked
+  int64_t utime_us_ = 0;                   // of the reference
+  std::optional<int64_t> first_utime_us_;  // of the frame after it, once that was asked
   std::vector<PointId> points_;  // sorted: that the reference saw; later, those of them that the frame after it saw
 };
 

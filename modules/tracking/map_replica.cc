@@ -1,14 +1,8 @@
 #include "tracking/map_replica.h"
 
-namespace tessera {
+#include "map/landmark_description.h"
 
-Landmark InWorld(const Sim3& world_from_keyframe, Landmark point) {
-  point.position_in_world = world_from_keyframe * point.position_in_world;
-  point.normal = world_from_keyframe.rotation * point.normal;
-  point.min_distance *= world_from_keyframe.scale;
-  point.max_distance *= world_from_keyframe.scale;
-  return point;
-}
+namespace tessera {
 
 std::string MapReplica::Apply(const MapDelta& delta) {
   removed_.Remember(map_, delta);

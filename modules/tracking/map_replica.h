@@ -2,7 +2,6 @@
 // yet, with the points that it placed itself.
 #pragma once
 
-#include <compare>
 #include <map>
 #include <optional>
 #include <string>
@@ -10,26 +9,14 @@
 
 #include "map/map.h"
 #include "map/removed_keyframes.h"
+#include "matching/point_id.h"
 
 namespace tessera {
 
-// A point that a frame can see: a landmark of the map, or what a keypoint of an unanswered keyframe sees.
-struct PointId {
-  LandmarkId landmark;
-  KeyframeId keyframe;
-  int32_t keypoint = -1;
-
-  bool valid() const { return landmark.valid() || keyframe.valid(); }
-  auto operator<=>(const PointId&) const = default;
-};
-
-// The landmark of a keyframe's frame and units in the world's.
-Landmark InWorld(const Sim3& world_from_keyframe, Landmark point_in_keyframe);
-
 // A keyframe on its way to the mapper.
 struct SentKeyframe {
-  KeyframeId reference;          // invalid: the first of a part
-  Rigid3 reference_from_camera;  // in the reference's units; world_from_camera for the first of a part
+  KeyframeId reference;                // invalid: the first of a part
+  Rigid3 reference_from_camera;        // in the reference's units; world_from_camera for the first of a part
   std::map<int32_t, Landmark> points;  // by keypoint: placed by the tracker, in the keyframe's frame and units
 };
 
@@ -42,8 +29,8 @@ class MapReplica {
   const Map& map() const { return map_; }
   const std::map<KeyframeId, SentKeyframe>& sent() const { return sent_; }
 
-  // Keyframe::WorldFromKeyframe of a keyframe of the map, one that was removed from it, or one on its way, which has the
-  // units of its reference.
+  // Keyframe::WorldFromKeyframe of a keyframe of the map, one that was removed from it, or one on its way, which has
+  // the units of its reference.
   std::optional<Sim3> PlaceOf(KeyframeId id) const;
   // The point in world coordinates; nullopt if it is gone.
   std::optional<Landmark> Find(const PointId& id) const;

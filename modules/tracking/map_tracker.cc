@@ -6,8 +6,9 @@
 #include <utility>
 
 #include "geometry/absolute_pose.h"
+#include "map/landmark_description.h"
 #include "map/neighbourhood.h"
-#include "tracking/frame_pose.h"
+#include "matching/frame_pose.h"
 
 namespace tessera {
 namespace {
@@ -156,7 +157,8 @@ bool MapTracker::Place(TrackedFrame& frame) const {
   const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalise(frame);
   if (!is_near) return false;
   MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
-  return OptimizeFrame(options_.pose, frame) >= (lost_since_us_ ? options_.min_relocalised_inliers : options_.min_inliers);
+  return OptimizeFrame(options_.pose, frame) >=
+         (lost_since_us_ ? options_.min_relocalised_inliers : options_.min_inliers);
 }
 
 bool MapTracker::FollowLast(TrackedFrame& frame) const {
@@ -166,7 +168,8 @@ bool MapTracker::FollowLast(TrackedFrame& frame) const {
   for (const double widening : {1.0, 2.0, 4.0}) {
     frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
     const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
-    if (num >= options_.min_last_matches && OptimizeFrame(options_.pose, frame) >= options_.min_last_matches / 2) return true;
+    if (num >= options_.min_last_matches && OptimizeFrame(options_.pose, frame) >= options_.min_last_matches / 2)
+      return true;
   }
   return false;
 }

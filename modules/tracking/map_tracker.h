@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "geometry/pose_optimization.h"
-#include "map/loop_types.h"
-#include "map/tracking_types.h"
+#include "matching/point_matching.h"
+#include "messages/loop_types.h"
+#include "messages/tracking_types.h"
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/map_replica.h"
-#include "tracking/point_matching.h"
 
 namespace tessera {
 
@@ -29,15 +29,15 @@ struct MapTrackerOptions {
   KeyframeDecisionOptions keyframes;
   PoseOptimizationOptions pose;
   double sigma_px = kKeypointSigmaPx;  // standard deviation of a keypoint's coordinates at level 0
-  int min_start_points = 150;        // stereo, RGB-D: keypoints with depth that a first keyframe needs
-  int min_last_matches = 20;         // fewer from the last frame: look in wider windows
-  int min_inliers = 25;              // points that a pose must agree with
-  int min_relocalised_inliers = 50;  // likewise after a loss, where chance has more room
-  int max_local_keyframes = 30;      // whose landmarks are looked for
-  int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
-  bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
-  int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
-  double max_depth_baselines = 40.0; // stereo, RGB-D: up to here a keypoint's depth makes a point at once
+  int min_start_points = 150;          // stereo, RGB-D: keypoints with depth that a first keyframe needs
+  int min_last_matches = 20;           // fewer from the last frame: look in wider windows
+  int min_inliers = 25;                // points that a pose must agree with
+  int min_relocalised_inliers = 50;    // likewise after a loss, where chance has more room
+  int max_local_keyframes = 30;        // whose landmarks are looked for
+  int64_t max_lost_us = 1500000;       // after so long without a pose, a new part of the map begins
+  bool makes_keyframes = true;         // false: the map is used as it is, and no part is begun
+  int max_unanswered_keyframes = 8;    // live: a mapper that is far behind isn't helped by more of them
+  double max_depth_baselines = 40.0;   // stereo, RGB-D: up to here a keypoint's depth makes a point at once
 
   // Empty if all is well, else one sentence.
   std::string Check() const;
@@ -58,8 +58,9 @@ class MapTracker {
 
   // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
   [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
-  // Frames in the order of their numbers; some may be missing. A pure function of the frames, deltas and answers so far.
-  // `answer`: where this frame, or the one that asked last, was taken. `may_ask`: an answer can be had for this frame.
+  // Frames in the order of their numbers; some may be missing. A pure function of the frames, deltas and answers so
+  // far. `answer`: where this frame, or the one that asked last, was taken. `may_ask`: an answer can be had for this
+  // frame.
   MapTrackingResult Track(const FeatureFrame& features, const RelocalizationAnswer* answer = nullptr,
                           bool may_ask = false);
   // The last keyframe sent: what a request is about.
@@ -100,10 +101,10 @@ class MapTracker {
   std::optional<Rigid3> current_from_last_;  // velocity: motion over the last frame interval, in the reference's units
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
-  Rigid3 part_from_world_;                   // world_from_camera where the next part begins
-  int64_t previous_utime_us_ = 0;            // of the frame before
+  Rigid3 part_from_world_;         // world_from_camera where the next part begins
+  int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> lost_since_us_;
-  Frame asked_;                              // the frame that asked last
+  Frame asked_;  // the frame that asked last
 };
 
 }  // namespace tessera

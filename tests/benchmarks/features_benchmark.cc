@@ -5,10 +5,10 @@
 #include <opencv2/features2d.hpp>
 
 #include "features/extractor.h"
-#include "features/feature_images.h"
 #include "features/selection.h"
 #include "features/tiling.h"
-#include "features/warped_pairs.h"
+#include "support/feature_images.h"
+#include "support/warped_pairs.h"
 
 namespace tessera {
 namespace {
@@ -114,9 +114,12 @@ BENCHMARK(CvOrb)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, whole, SensorType::kMono, TileGrid{1, 1}, 0)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, cut_2x2, SensorType::kMono, TileGrid{2, 2}, 4)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, cut_2x8, SensorType::kMono, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_2, SensorType::kMono, TileGrid{2, 8}, 2)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_3, SensorType::kMono, TileGrid{2, 8}, 3)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_8, SensorType::kMono, TileGrid{2, 8}, 8)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_2, SensorType::kMono, TileGrid{2, 8}, 2)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_3, SensorType::kMono, TileGrid{2, 8}, 3)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_8, SensorType::kMono, TileGrid{2, 8}, 8)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, whole_stereo, SensorType::kStereo, TileGrid{1, 1}, 0)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, cut_2x8_stereo, SensorType::kStereo, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Cutting, cut_2x8, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);

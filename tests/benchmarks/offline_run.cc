@@ -49,8 +49,7 @@ Rigid3 Mirrored(const Rigid3& pose) {
 
 }  // namespace
 
-FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptions& feature_options,
-                                bool is_mirrored) {
+FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptions& feature_options, bool is_mirrored) {
   const auto source = OpenSource(options);
   FeatureSequence sequence{source->calibration(), {}, source->ground_truth(), {}, {}};
   if (is_mirrored) {
@@ -96,9 +95,8 @@ class Mapping {
 
   std::shared_ptr<const MapDelta> Process(const KeyframeObservation& keyframe) {
     const DueCorrections due = run_.loop_closer ? schedule_.Take(keyframe.id) : DueCorrections{};
-    const auto delta = Measure(run_.map_ms, [&] {
-      return std::make_shared<const MapDelta>(run_.mapper.Process(keyframe, due));
-    });
+    const auto delta =
+        Measure(run_.map_ms, [&] { return std::make_shared<const MapDelta>(run_.mapper.Process(keyframe, due)); });
     Follow(*delta);
     if (run_.loop_closer) {
       LoopResult result = Measure(run_.loop_ms, [&] { return run_.loop_closer->FindLoop(keyframe.id); });
@@ -125,9 +123,8 @@ class Mapping {
     if (const std::string problem = run_.loop_closer->ApplyDelta(delta); !problem.empty()) throw InputError(problem);
     if (!delta.asks_adjustment) return;
     schedule_.Ask(delta.answers, delta.number);
-    schedule_.Receive(Measure(run_.adjust_ms, [&] {
-      return AdjustGlobally(run_.mapper.map(), delta.answers, GlobalBundleOptions());
-    }));
+    schedule_.Receive(Measure(run_.adjust_ms,
+                              [&] { return AdjustGlobally(run_.mapper.map(), delta.answers, GlobalBundleOptions()); }));
   }
 
   OfflineRun& run_;

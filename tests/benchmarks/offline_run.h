@@ -8,8 +8,8 @@
 #include "datasets/frame_source.h"
 #include "evaluation/pose_text.h"
 #include "features/feature_types.h"
-#include "stages/loop_closer/loop_closer.h"
-#include "stages/mapper/mapper.h"
+#include "loop_closing/loop_closer.h"
+#include "mapping/mapper.h"
 #include "tracking/delta_schedule.h"
 #include "tracking/map_tracker.h"
 
@@ -20,12 +20,12 @@ struct FeatureSequence {
   CameraCalibration calibration;
   std::vector<FeatureFrame> frames;
   std::vector<GroundTruthPose> ground_truth;
-  std::vector<double> extract_ms;  // CPU time by frame
+  std::vector<double> extract_ms;    // CPU time by frame
   std::vector<int64_t> num_corners;  // by frame: candidates before the selection
 };
 
-// Reads and extracts. `is_mirrored` (mono only) swaps left and right in images and truth: a sequence of its own, equally
-// hard. Throws InputError as OpenSource does.
+// Reads and extracts. `is_mirrored` (mono only) swaps left and right in images and truth: a sequence of its own,
+// equally hard. Throws InputError as OpenSource does.
 FeatureSequence ExtractSequence(const SourceOptions& source, const FeatureOptions& options, bool is_mirrored);
 
 struct OfflineRun {
@@ -37,7 +37,7 @@ struct OfflineRun {
   std::vector<LoopResult> loops;  // by keyframe, without their corrections
   std::vector<PoseEstimate> poses;
   int num_lost = 0;
-  int num_failures = 0;  // changes from tracked to lost
+  int num_failures = 0;                                      // changes from tracked to lost
   std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
   // Places of tracked frames: as known at the time, and after all optimisation.

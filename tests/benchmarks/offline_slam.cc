@@ -4,7 +4,8 @@
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
-// OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimisation), trajectory_live.txt and ground_truth.txt, TUM rows each.
+// OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimisation), trajectory_live.txt and
+// ground_truth.txt, TUM rows each.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -39,12 +40,18 @@ Arguments ParseArguments(int argc, char** argv) {
       continue;
     }
     const int64_t value = std::stoll(text.substr(key.size() + 1));
-    if (key == "first") arguments.source.first_frame = value;
-    else if (key == "last") arguments.source.last_frame = value;
-    else if (key == "delay") arguments.map_delay_frames = value;
-    else if (key == "features") arguments.features.num_features = static_cast<int>(value);
-    else if (key == "mirror") arguments.is_mirrored = value != 0;
-    else throw InputError("unknown argument `" + key + "`");
+    if (key == "first")
+      arguments.source.first_frame = value;
+    else if (key == "last")
+      arguments.source.last_frame = value;
+    else if (key == "delay")
+      arguments.map_delay_frames = value;
+    else if (key == "features")
+      arguments.features.num_features = static_cast<int>(value);
+    else if (key == "mirror")
+      arguments.is_mirrored = value != 0;
+    else
+      throw InputError("unknown argument `" + key + "`");
   }
   return arguments;
 }
@@ -91,20 +98,20 @@ void WriteFigures(const FeatureSequence& sequence, const OfflineRun& run, const 
   };
   const Map& map = run.mapper.map();
   double num_observations = 0.0, length_m = 0.0;
-  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
-    num_observations += static_cast<double>(map.ObservationsOf(id).size());
-  });
+  map.landmarks().ForEach(
+      [&](LandmarkId id, const Landmark&) { num_observations += static_cast<double>(map.ObservationsOf(id).size()); });
   for (size_t i = 1; i < sequence.ground_truth.size(); ++i) {
     if (sequence.ground_truth[i].frame > sequence.frames.back().frame) break;
     length_m += (sequence.ground_truth[i].world_from_camera.translation -
-                 sequence.ground_truth[i - 1].world_from_camera.translation).norm();
+                 sequence.ground_truth[i - 1].world_from_camera.translation)
+                    .norm();
   }
   const bool is_mono = sequence.calibration.sensor == SensorType::kMono;
   const double rms_m = RmsError(run.Optimized(), sequence.ground_truth, is_mono).value_or(-1.0);
   std::ofstream file(out_dir / "figures.csv");
   file << "frames,lost,corners_per_image,matches_per_frame,observations_per_landmark,loops,length_m,rms_m\n"
-       << run.poses.size() << ',' << run.num_lost << ',' << mean(sequence.num_corners, [](int64_t n) { return n; }) << ','
-       << mean(run.poses, [](const PoseEstimate& pose) { return pose.num_inliers; }) << ','
+       << run.poses.size() << ',' << run.num_lost << ',' << mean(sequence.num_corners, [](int64_t n) { return n; })
+       << ',' << mean(run.poses, [](const PoseEstimate& pose) { return pose.num_inliers; }) << ','
        << num_observations / std::max(1.0, static_cast<double>(map.landmarks().size())) << ','
        << map.closed_loops().size() << ',' << length_m << ',' << rms_m << '\n';
 }
@@ -144,7 +151,8 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::cerr << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]\n";
+    std::cerr << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] "
+                 "[vocabulary=FILE]\n";
     return 2;
   }
   try {

@@ -1,5 +1,5 @@
-// Time of bundle adjustment on synthetic local windows; time and memory of pose graphs and of global bundle adjustment on
-// synthetic streets with one loop, and how they grow.
+// Time of bundle adjustment on synthetic local windows; time and memory of pose graphs and of global bundle adjustment
+// on synthetic streets with one loop, and how they grow.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
@@ -13,15 +13,15 @@
 
 #include "optimization/bundle_adjustment.h"
 #include "optimization/pose_graph.h"
-#include "optimization/synthetic_bundle.h"
-#include "optimization/synthetic_circuit.h"
-#include "optimization/synthetic_street.h"
+#include "support/synthetic_bundle.h"
+#include "support/synthetic_circuit.h"
+#include "support/synthetic_street.h"
 
 namespace tessera {
 namespace {
 
-// 20 keyframes of which 4 are fixed, 3000 points, 12000 observations; `percent_right` of them have a right column. All of
-// range(1) iterations are made in one round, so that the time an iteration can be told.
+// 20 keyframes of which 4 are fixed, 3000 points, 12000 observations; `percent_right` of them have a right column. All
+// of range(1) iterations are made in one round, so that the time an iteration can be told.
 void BM_LocalBundle(benchmark::State& state) {
   SyntheticBundleOptions world;
   world.num_poses = static_cast<int>(state.range(2));
@@ -149,9 +149,13 @@ double CircuitRms(const SyntheticBundle& bundle, const std::vector<Rigid3>& came
 // A circuit of range(0) keyframes, 8 edges a keyframe, one loop; Sim(3) or SE(3).
 void BM_PoseGraph(benchmark::State& state) {
   const bool has_scale = state.range(1) != 0;
-  const SyntheticCircuit circuit = MakeSyntheticCircuit(
-      {.num_keyframes = static_cast<int>(state.range(0)), .step_m = 2.0, .num_neighbours = 8, .has_scale = has_scale,
-       .rotation_sigma_rad = 0.0003, .log_scale_sigma = 0.002, .log_scale_drift = 0.3});
+  const SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = static_cast<int>(state.range(0)),
+                                                         .step_m = 2.0,
+                                                         .num_neighbours = 8,
+                                                         .has_scale = has_scale,
+                                                         .rotation_sigma_rad = 0.0003,
+                                                         .log_scale_sigma = 0.002,
+                                                         .log_scale_drift = 0.3});
   std::vector<Sim3> poses;
   MeasureRun(state, has_scale ? "pose graph, Sim(3)" : "pose graph, SE(3)",
              [&] { poses = *OptimizePoseGraph(circuit.problem, {}); });
@@ -165,8 +169,8 @@ BENCHMARK(BM_PoseGraph)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 
-// A whole map of range(0) keyframes after its loop was closed: 60 new landmarks a keyframe, each seen by 3 to 7, so that
-// neighbours share about 200; `percent_right` of the observations have a right column.
+// A whole map of range(0) keyframes after its loop was closed: 60 new landmarks a keyframe, each seen by 3 to 7, so
+// that neighbours share about 200; `percent_right` of the observations have a right column.
 void BM_GlobalBundle(benchmark::State& state) {
   const SyntheticBundle bundle = MakeSyntheticStreet({.num_keyframes = static_cast<int>(state.range(0)),
                                                       .share_with_right = 0.01 * static_cast<double>(state.range(1))});

@@ -3,11 +3,11 @@
 //   place_recall SOURCE OUT_DIR VOCABULARY... [key=value]...
 //   place_recall kitti:../shared/data/torcs/g-track-3 /tmp/places config/vocabulary.tvoc spacing=2
 //
-// Frames are taken every `spacing` metres (or `turn` radians). Each asks for the best place among those at least `apart`
-// metres of way before it. Its score is divided by the similarity with the frame before it, what a view of the same place
-// would reach at best (Galvez-Lopez and Tardos 2012, eq. 2). The answer is true if the camera stood within `near` metres
-// and `angle` radians of it. Of all frames that a true answer exists for, recall is the share that got one with a score
-// above the threshold; precision is the share of true ones among all answers above it.
+// Frames are taken every `spacing` metres (or `turn` radians). Each asks for the best place among those at least
+// `apart` metres of way before it. Its score is divided by the similarity with the frame before it, what a view of the
+// same place would reach at best (Galvez-Lopez and Tardos 2012, eq. 2). The answer is true if the camera stood within
+// `near` metres and `angle` radians of it. Of all frames that a true answer exists for, recall is the share that got
+// one with a score above the threshold; precision is the share of true ones among all answers above it.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -46,10 +46,10 @@ Arguments ParseArguments(int argc, char** argv) {
   Arguments arguments;
   arguments.source.source = argv[1];
   arguments.out_dir = argv[2];
-  const std::map<std::string, double*> keys = {
-      {"last", &arguments.last_frame}, {"spacing", &arguments.spacing_m}, {"turn", &arguments.turn_rad},
-      {"apart", &arguments.apart_m},   {"near", &arguments.near_m},       {"angle", &arguments.angle_rad},
-      {"features", &arguments.num_features}};
+  const std::map<std::string, double*> keys = {{"last", &arguments.last_frame},      {"spacing", &arguments.spacing_m},
+                                               {"turn", &arguments.turn_rad},        {"apart", &arguments.apart_m},
+                                               {"near", &arguments.near_m},          {"angle", &arguments.angle_rad},
+                                               {"features", &arguments.num_features}};
   for (int i = 3; i < argc; ++i) {
     const std::string text = argv[i], key = text.substr(0, text.find('='));
     if (key == text) {
@@ -76,7 +76,8 @@ std::vector<View> CollectViews(const Arguments& arguments) {
   const auto source = OpenSource(arguments.source);
   std::map<FrameId, Rigid3> truth;
   for (const GroundTruthPose& pose : source->ground_truth()) truth[pose.frame] = pose.world_from_camera;
-  if (truth.empty()) throw InputError("source `" + arguments.source.source + "` has no ground truth: give one that has");
+  if (truth.empty())
+    throw InputError("source `" + arguments.source.source + "` has no ground truth: give one that has");
   const FeatureOptions options{.num_features = static_cast<int>(arguments.num_features)};
   Extractor extractor;
   std::vector<View> views;
@@ -87,8 +88,9 @@ std::vector<View> CollectViews(const Arguments& arguments) {
     if (pose == truth.end()) continue;
     if (previous) way_m += (pose->second.translation - previous->translation).norm();
     previous = pose->second;
-    const bool is_due = views.empty() || way_m - views.back().way_m >= arguments.spacing_m ||
-                        views.back().world_from_camera.rotation.angularDistance(pose->second.rotation) >= arguments.turn_rad;
+    const bool is_due =
+        views.empty() || way_m - views.back().way_m >= arguments.spacing_m ||
+        views.back().world_from_camera.rotation.angularDistance(pose->second.rotation) >= arguments.turn_rad;
     if (!is_due) continue;
     std::vector<TileFeatures> tiles;
     for (const TileJob& job : CutFrame(*frame, source->calibration(), 0, TileGrid{1, 1}, kMaxLevels, options)) {
@@ -106,15 +108,16 @@ bool IsSamePlace(const View& a, const View& b, const Arguments& arguments) {
 
 struct Answer {
   FrameId frame;
-  FrameId place;              // invalid: none was found
-  double score = 0.0;         // similarity with the place
-  double normalised = 0.0;    // divided by the similarity with the view before
-  double distance_m = -1.0;   // from the place
+  FrameId place;             // invalid: none was found
+  double score = 0.0;        // similarity with the place
+  double normalised = 0.0;   // divided by the similarity with the view before
+  double distance_m = -1.0;  // from the place
   bool is_true = false;
-  bool has_truth = false;     // some earlier view is the same place
+  bool has_truth = false;  // some earlier view is the same place
 };
 
-std::vector<Answer> AskForEach(const std::vector<View>& views, const Vocabulary& vocabulary, const Arguments& arguments) {
+std::vector<Answer> AskForEach(const std::vector<View>& views, const Vocabulary& vocabulary,
+                               const Arguments& arguments) {
   PlaceDatabase database;  // keyframes are numbered as views
   std::vector<Answer> answers;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -147,14 +150,14 @@ struct Curve {
   struct Point {
     double threshold, recall, precision;
   };
-  std::vector<Point> points;  // from the highest threshold down
-  double sure_recall = 0.0;   // the highest recall at 100 % precision
+  std::vector<Point> points;    // from the highest threshold down
+  double sure_recall = 0.0;     // the highest recall at 100 % precision
   double sure_threshold = 0.0;  // the lowest that still has it
   double best_false = 0.0;      // the highest score of an answer that is not true
 };
 
 // Answers in falling order of their scores; equal ones stand or fall together.
-Curve MakeCurve(std::vector<Answer> answers, double Answer::*score) {
+Curve MakeCurve(std::vector<Answer> answers, double Answer::* score) {
   const auto num_to_find = std::count_if(answers.begin(), answers.end(), [](const Answer& a) { return a.has_truth; });
   std::erase_if(answers, [](const Answer& answer) { return !answer.place.valid(); });
   std::sort(answers.begin(), answers.end(), [&](const Answer& a, const Answer& b) { return a.*score > b.*score; });
@@ -191,11 +194,11 @@ void WriteFiles(const std::vector<Answer>& answers, const Curve& curve, const st
 void Measure(const std::vector<View>& views, const std::string& path, const Arguments& arguments) {
   const std::vector<Answer> answers = AskForEach(views, *Vocabulary::Load(path), arguments);
   const Curve curve = MakeCurve(answers, &Answer::normalised), raw = MakeCurve(answers, &Answer::score);
-  const auto count = [&](bool Answer::*what) {
+  const auto count = [&](bool Answer::* what) {
     return std::count_if(answers.begin(), answers.end(), [&](const Answer& answer) { return answer.*what; });
   };
-  std::printf("%s: views %zu, revisits %td, best place true %td\n", path.c_str(), views.size(), count(&Answer::has_truth),
-              count(&Answer::is_true));
+  std::printf("%s: views %zu, revisits %td, best place true %td\n", path.c_str(), views.size(),
+              count(&Answer::has_truth), count(&Answer::is_true));
   for (const auto& [name, of] : {std::pair("score / neighbour's", &curve), std::pair("bare score", &raw)}) {
     std::printf("  %s: recall at 100 %% precision %.3f down to %.3f; best false answer %.3f\n", name, of->sure_recall,
                 of->sure_threshold, of->best_false);
@@ -208,8 +211,9 @@ void Measure(const std::vector<View>& views, const std::string& path, const Argu
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::cerr << "usage: place_recall SOURCE OUT_DIR VOCABULARY... [spacing=2] [turn=0.3] [apart=50] [near=10] [angle=0.6] "
-                 "[last=-1] [features=2000]\n";
+    std::cerr
+        << "usage: place_recall SOURCE OUT_DIR VOCABULARY... [spacing=2] [turn=0.3] [apart=50] [near=10] [angle=0.6] "
+           "[last=-1] [features=2000]\n";
     return 2;
   }
   try {

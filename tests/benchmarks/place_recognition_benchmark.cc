@@ -1,10 +1,10 @@
-// Time to load the shipped vocabulary, to describe an image by it, and to ask for places among many keyframes. Images are
-// made of noisy copies of the vocabulary's own words.
+// Time to load the shipped vocabulary, to describe an image by it, and to ask for places among many keyframes. Images
+// are made of noisy copies of the vocabulary's own words.
 #include <benchmark/benchmark.h>
 
 #include "place_recognition/place_database.h"
-#include "place_recognition/planted_descriptors.h"
 #include "place_recognition/vocabulary.h"
+#include "support/planted_descriptors.h"
 
 namespace tessera {
 namespace {
@@ -42,7 +42,8 @@ void Describe(benchmark::State& state) {
 void Query(benchmark::State& state) {
   PlaceDatabase database;
   for (int64_t i = 0; i < state.range(0); ++i) {
-    database.Add(KeyframeId{i}, std::make_shared<const BagOfWords>(Shipped().Describe(MakeImage(static_cast<uint64_t>(i)))));
+    database.Add(KeyframeId{i},
+                 std::make_shared<const BagOfWords>(Shipped().Describe(MakeImage(static_cast<uint64_t>(i)))));
   }
   const BagOfWords bag = Shipped().Describe(MakeImage(static_cast<uint64_t>(state.range(0) / 2)));
   const auto accepts = [](KeyframeId) { return true; };

@@ -1,6 +1,6 @@
 #include "datasets/calibration_file.h"
 
-#include "datasets/dataset_folder.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -19,12 +19,11 @@ TEST(CalibrationFile, ShippedFilesLoad) {
 
 TEST(CalibrationFile, ReadsEveryKey) {
   const DatasetFolder folder;
-  folder.Write(
-      "c.yaml",
-      std::string(kPinhole) +
-          "width_px: 640\nheight_px: 480\ndistortion: [0.1, -0.2, 1e-3, 2e-3, 0.05]\ndepth_unit_m: 0.001\n"
-          "right:\n  fx_px: 410\n  fy_px: 411\n  cx_px: 321\n  cy_px: 241\n"
-          "  right_from_left: [1, 0, 0, -0.25, 0, 0, 1, 0.5, 0, -1, 0, 0.75]\n");
+  folder.Write("c.yaml",
+               std::string(kPinhole) +
+                   "width_px: 640\nheight_px: 480\ndistortion: [0.1, -0.2, 1e-3, 2e-3, 0.05]\ndepth_unit_m: 0.001\n"
+                   "right:\n  fx_px: 410\n  fy_px: 411\n  cx_px: 321\n  cy_px: 241\n"
+                   "  right_from_left: [1, 0, 0, -0.25, 0, 0, 1, 0.5, 0, -1, 0, 0.75]\n");
   const CameraRig rig = LoadCalibrationFile(folder.path("c.yaml"));
   EXPECT_EQ(rig.left.width_px, 640);
   EXPECT_EQ(rig.left.height_px, 480);

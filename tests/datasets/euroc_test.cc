@@ -1,8 +1,8 @@
 #include <cmath>
 
-#include "datasets/dataset_folder.h"
 #include "datasets/frame_source.h"
 #include "geometry/rigid3.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -46,13 +46,12 @@ class EurocTest : public testing::Test {
       std::snprintf(number, sizeof number, "%.15f, ", m(i / 4, i % 4));
       transform += number;
     }
-    folder_.Write(
-        "mav0/" + camera + "/sensor.yaml",
-        "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [" + transform +
-            "0.0, 0.0, 0.0, 1.0]\nresolution: [80, 60]\ncamera_model: pinhole\n"
-            "intrinsics: [60.0, 61.0, 40.0, 30.0] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
-            "distortion_coefficients: [" +
-            (distortion.empty() ? "-0.2, 0.05, 0.0002, 0.0001" : distortion) + "]\n");
+    folder_.Write("mav0/" + camera + "/sensor.yaml",
+                  "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [" + transform +
+                      "0.0, 0.0, 0.0, 1.0]\nresolution: [80, 60]\ncamera_model: pinhole\n"
+                      "intrinsics: [60.0, 61.0, 40.0, 30.0] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
+                      "distortion_coefficients: [" +
+                      (distortion.empty() ? "-0.2, 0.05, 0.0002, 0.0001" : distortion) + "]\n");
     std::string rows = "#timestamp [ns],filename\r\n";
     for (const int frame : frames) {
       const std::string name = std::to_string(kStartNs + frame * kFrameNs);
@@ -157,8 +156,7 @@ TEST_F(EurocTest, BadFilesAreRefused) {
 }
 
 TEST_F(EurocTest, ImagesOfAnotherSizeThanTheCalibrationAreRefused) {
-  folder_.WriteImage("mav0/cam0/data/" + std::to_string(kStartNs) + ".png",
-                     DatasetFolder::Pattern(70, 60, 0));
+  folder_.WriteImage("mav0/cam0/data/" + std::to_string(kStartNs) + ".png", DatasetFolder::Pattern(70, 60, 0));
   ExpectRefused({std::to_string(kStartNs) + ".png", "70x60", "80x60"});
 }
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <opencv2/videoio.hpp>
 
-#include "datasets/dataset_folder.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -25,8 +25,8 @@ TEST(OpenSource, UnknownSourcesAreRefused) {
 class VideoTest : public testing::Test {
  protected:
   VideoTest() {
-    cv::VideoWriter writer(folder_.path("v.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25.0,
-                           cv::Size(64, 48), true);
+    cv::VideoWriter writer(folder_.path("v.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25.0, cv::Size(64, 48),
+                           true);
     for (int i = 0; i < 6; ++i) {
       writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20.0 + 30.0 * i)));
     }
@@ -61,8 +61,7 @@ TEST_F(VideoTest, YieldsFramesAtTheRateOfTheFile) {
 }
 
 TEST_F(VideoTest, BadInputIsRefused) {
-  ExpectInputError([&] { OpenSource(Options(source_)); },
-                   {source_, "--camera FILE.yaml", folder_.path("v.yaml")});
+  ExpectInputError([&] { OpenSource(Options(source_)); }, {source_, "--camera FILE.yaml", folder_.path("v.yaml")});
   folder_.Write("v.yaml", kCalibration);
   SourceOptions options = Options(source_);
   options.last_frame = 7;

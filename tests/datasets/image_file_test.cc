@@ -1,6 +1,6 @@
 #include "datasets/image_file.h"
 
-#include "datasets/dataset_folder.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -25,8 +25,7 @@ TEST(ImageFile, RefusesEveryTruncatedJpegAndPng) {
       ExpectInputError([&] { ReadGrayImage(folder.path(name)); }, {folder.path(name)});
     }
     folder.Write(name, whole.substr(0, whole.size() - 1));
-    ExpectInputError([&] { ReadGrayImage(folder.path(name)); },
-                     {folder.path(name), "truncated", "copy it again"});
+    ExpectInputError([&] { ReadGrayImage(folder.path(name)); }, {folder.path(name), "truncated", "copy it again"});
   }
 }
 

@@ -1,7 +1,7 @@
 #include <cstdio>
 
-#include "datasets/dataset_folder.h"
 #include "datasets/frame_source.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -30,9 +30,7 @@ class KittiTest : public testing::Test {
     std::snprintf(name, sizeof name, "sequences/07/image_%d/%06d.png", camera, index);
     return name;
   }
-  void Write(const std::string& name, const std::string& text) {
-    folder_.Write("sequences/07/" + name, text);
-  }
+  void Write(const std::string& name, const std::string& text) { folder_.Write("sequences/07/" + name, text); }
   std::string Path(const std::string& name) { return folder_.path("sequences/07/" + name); }
   SourceOptions Options(SensorType sensor = SensorType::kMono) {
     SourceOptions options;
@@ -102,8 +100,7 @@ TEST_F(KittiTest, RangesOutsideAreRefused) {
     SourceOptions options = Options();
     options.first_frame = first;
     options.last_frame = last;
-    ExpectInputError([&] { OpenSource(options); },
-                     {"frames " + std::to_string(first) + ":", "0:5", options.source});
+    ExpectInputError([&] { OpenSource(options); }, {"frames " + std::to_string(first) + ":", "0:5", options.source});
   }
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "datasets/dataset_folder.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -11,10 +11,8 @@ namespace {
 // The EuRoC pair's cameras.
 CameraRig WideAnglePair() {
   CameraRig rig;
-  rig.left = {
-      752, 480, 458.654, 457.296, 367.215, 248.375, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}};
-  rig.right = {
-      752, 480, 457.587, 456.134, 379.999, 255.238, {-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05}};
+  rig.left = {752, 480, 458.654, 457.296, 367.215, 248.375, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}};
+  rig.right = {752, 480, 457.587, 456.134, 379.999, 255.238, {-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05}};
   rig.right_from_left = {ExpSO3({-0.0141, 0.00036, -0.0023}), {-0.110074, 0.0004, -0.00085}};
   return rig;
 }
@@ -84,14 +82,12 @@ TEST(Rectifier, PairSeesPointsInOneRowWithTheDisparityOfTheirDepth) {
   EXPECT_NEAR(calibration.baseline_m, rig.right_from_left.translation.norm(), 1e-9);
   for (const Eigen::Vector3d& point : kPoints) {
     const Eigen::Vector3d point_in_rectified = rectifier.left_from_rectified().Inverse() * point;
-    const Eigen::Vector2d left =
-        FindSpot(rectifier.Left(DrawSpot(rig.left, ProjectDistorted(rig.left, point))));
-    const Eigen::Vector2d right = FindSpot(
-        rectifier.Right(DrawSpot(*rig.right, ProjectDistorted(*rig.right, rig.right_from_left * point))));
+    const Eigen::Vector2d left = FindSpot(rectifier.Left(DrawSpot(rig.left, ProjectDistorted(rig.left, point))));
+    const Eigen::Vector2d right =
+        FindSpot(rectifier.Right(DrawSpot(*rig.right, ProjectDistorted(*rig.right, rig.right_from_left * point))));
     EXPECT_LT((left - calibration.Project(point_in_rectified)).norm(), 0.2) << point.transpose();
     EXPECT_NEAR(left.y(), right.y(), 0.1) << point.transpose();
-    EXPECT_NEAR(left.x() - right.x(), calibration.fx_px * calibration.baseline_m / point_in_rectified.z(),
-                0.15);
+    EXPECT_NEAR(left.x() - right.x(), calibration.fx_px * calibration.baseline_m / point_in_rectified.z(), 0.15);
   }
 }
 

@@ -1,6 +1,6 @@
-#include "datasets/dataset_folder.h"
 #include "datasets/frame_source.h"
 #include "datasets/readme_calibration.h"
+#include "support/dataset_folder.h"
 
 namespace tessera {
 namespace {
@@ -80,14 +80,12 @@ TEST_F(TumTest, FallsBackOnTheUsualKinectWithAWarning) {
 }
 
 TEST_F(TumTest, TakesTheCalibrationFromReadmeThenFileThenOption) {
-  folder_.Write(
-      "README",
-      "RGB-D, depth in millimetres (factor 1000; the TUM sets use 5000), pinhole fx=fy=585 cx=320 cy=240.");
+  folder_.Write("README",
+                "RGB-D, depth in millimetres (factor 1000; the TUM sets use 5000), pinhole fx=fy=585 cx=320 cy=240.");
   auto source = OpenSource(Options());
   EXPECT_EQ(source->calibration().fy_px, 585.0);
   EXPECT_EQ(source->calibration().depth_unit_m, 0.001);
-  EXPECT_NE(Joined(source->notes()).find(folder_.path("README") + ": fx=585 fy=585 cx=320 cy=240"),
-            std::string::npos);
+  EXPECT_NE(Joined(source->notes()).find(folder_.path("README") + ": fx=585 fy=585 cx=320 cy=240"), std::string::npos);
   EXPECT_EQ(Joined(source->notes()).find("Warning"), std::string::npos);
 
   folder_.Write("calibration.yaml", "fx_px: 500\nfy_px: 500\ncx_px: 320\ncy_px: 240\ndepth_unit_m: 0.002\n");

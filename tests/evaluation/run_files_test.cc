@@ -83,8 +83,7 @@ TEST(PoseText, TumRowHasTheTimeToTheMicrosecond) {
 }
 
 TEST(PoseText, KittiRowIsTheMatrixRowByRow) {
-  const Rigid3 pose{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ())),
-                    {1.0, 2.0, 3.0}};
+  const Rigid3 pose{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ())), {1.0, 2.0, 3.0}};
   double numbers[12];
   std::istringstream row(KittiRow(pose));
   for (double& number : numbers) {
@@ -107,8 +106,8 @@ TEST_F(RunFilesTest, WritesAllFilesAndLeavesNothingBeside) {
   }
   std::sort(names.begin(), names.end());
   EXPECT_EQ(names,
-            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "loops.csv", "map.ply", "run.json",
-                                      "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
+            (std::vector<std::string>{"frames.csv", "ground_truth.txt", "keyframes.txt", "loops.csv", "map.ply",
+                                      "run.json", "trajectory.txt", "trajectory_kitti.txt", "trajectory_live.txt"}));
 }
 
 TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {

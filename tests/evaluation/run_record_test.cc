@@ -53,8 +53,8 @@ RunRecord RecordOf(const std::vector<TrackingState>& states, int64_t first_frame
 }
 
 TEST(RunRecord, CountsFramesByWhatBecameOfThem) {
-  RunRecord record = RecordOf(
-      {kInitializing, kInitializing, kTracked, kLost, kLost, kTracked, kTracked, kLost, kInitializing});
+  RunRecord record =
+      RecordOf({kInitializing, kInitializing, kTracked, kLost, kLost, kTracked, kTracked, kLost, kInitializing});
   record.SetEnd(12, 3);
   const FrameCounts counts = record.Counts();
   EXPECT_EQ(counts.frames, 12);

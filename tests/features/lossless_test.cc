@@ -6,9 +6,9 @@
 #include <random>
 
 #include "features/extractor.h"
-#include "features/feature_images.h"
 #include "features/selection.h"
 #include "features/tiling.h"
+#include "support/feature_images.h"
 
 namespace tessera {
 namespace {

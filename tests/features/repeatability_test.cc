@@ -3,8 +3,8 @@
 
 #include <cstdio>
 
-#include "features/feature_images.h"
-#include "features/warped_pairs.h"
+#include "support/feature_images.h"
+#include "support/warped_pairs.h"
 
 namespace tessera {
 namespace {
@@ -39,10 +39,11 @@ void ExpectAtLeastCvOrb(const char* name, const std::vector<GrayImage>& images) 
     const Quality tessera = Measure(images, options, ExtractTessera);
     const Quality orb = Measure(images, options, ExtractCvOrb);
     const Quality orb_descriptors = Measure(images, options, ExtractCvOrbAtTessera);
-    std::printf("%s, %d keypoints: repeatability %.3f (cv::ORB %.3f), inliers among matches %.3f (cv::ORB %.3f, its "
-                "descriptors at our keypoints %.3f)\n",
-                name, num_features, tessera.repeatability, orb.repeatability, tessera.inlier_share, orb.inlier_share,
-                orb_descriptors.inlier_share);
+    std::printf(
+        "%s, %d keypoints: repeatability %.3f (cv::ORB %.3f), inliers among matches %.3f (cv::ORB %.3f, its "
+        "descriptors at our keypoints %.3f)\n",
+        name, num_features, tessera.repeatability, orb.repeatability, tessera.inlier_share, orb.inlier_share,
+        orb_descriptors.inlier_share);
     EXPECT_GE(tessera.repeatability, orb.repeatability) << name;
     EXPECT_GE(tessera.inlier_share, orb.inlier_share) << name;
     EXPECT_GE(tessera.inlier_share, orb_descriptors.inlier_share - 0.01) << name;
@@ -58,8 +59,7 @@ TEST(Repeatability, OfRealImages) {
     if (!image) GTEST_SKIP() << "KITTI sequence 03 is not in " TESSERA_DATA;
     images.push_back(*image);
   }
-  for (const char* path :
-       {"euroc/MH_01/mav0/cam0/data/1403636584763555584.jpg", "rgbd/kitchen/rgb/0.033333.jpg"}) {
+  for (const char* path : {"euroc/MH_01/mav0/cam0/data/1403636584763555584.jpg", "rgbd/kitchen/rgb/0.033333.jpg"}) {
     const std::optional<GrayImage> image = ReadRealImage(path);
     if (!image) GTEST_SKIP() << path << " is not in " TESSERA_DATA;
     images.push_back(*image);

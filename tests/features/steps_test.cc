@@ -7,11 +7,11 @@
 
 #include "features/corner_detector.h"
 #include "features/descriptor.h"
-#include "features/feature_images.h"
 #include "features/pattern.h"
 #include "features/pyramid.h"
 #include "features/smoother.h"
 #include "features/tile_plan.h"
+#include "support/feature_images.h"
 
 namespace tessera {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "core/errors.h"
 #include "features/extractor.h"
-#include "features/feature_images.h"
 #include "features/selection.h"
 #include "features/tile_plan.h"
+#include "support/feature_images.h"
 
 namespace tessera {
 namespace {
@@ -90,54 +90,45 @@ void ExpectRefused(const std::vector<std::function<void(TileJob&)>>& harms, Sens
 TEST(CheckTileJob, RefusesHostileNumbers) {
   constexpr int kHuge = std::numeric_limits<int>::max();
   constexpr int kLow = std::numeric_limits<int>::min();
-  ExpectRefused(
-      {[](TileJob& job) { job.frame = FrameId{-1}; },
-       [](TileJob& job) { job.tile = job.num_tiles; },
-       [](TileJob& job) { job.tile = -1; },
-       [](TileJob& job) { job.num_tiles = 0; },
-       [](TileJob& job) { job.calibration.width_px = 0; },
-       [](TileJob& job) { job.calibration.width_px = 1 << 20; },
-       [](TileJob& job) { job.calibration.height_px = kLow; },
-       [](TileJob& job) { job.calibration.fx_px = std::numeric_limits<double>::quiet_NaN(); },
-       [](TileJob& job) { job.calibration.sensor = static_cast<SensorType>(77); },
-       [](TileJob& job) { job.options.num_features = kHuge; },
-       [](TileJob& job) { job.options.num_levels = 99; },
-       [](TileJob& job) { job.options.min_score = 0; },
-       [](TileJob& job) { job.options.max_disparity_px = kHuge; },
-       [](TileJob& job) { job.first_level = -1; },
-       [](TileJob& job) { job.last_level = job.options.num_levels; },
-       [](TileJob& job) { job.first_level = job.last_level + 1; },
-       [](TileJob& job) { job.core.x = -1; },
-       [](TileJob& job) { job.core.width = kHuge; },
-       [](TileJob& job) { job.core.height = -5; },
-       [](TileJob& job) { job.core = {kHuge, kHuge, kHuge, kHuge}; },
-       [](TileJob& job) { job.core = {kLow, kLow, kLow, kLow}; }},
-      SensorType::kMono);
+  ExpectRefused({[](TileJob& job) { job.frame = FrameId{-1}; },
+                 [](TileJob& job) { job.tile = job.num_tiles; },
+                 [](TileJob& job) { job.tile = -1; },
+                 [](TileJob& job) { job.num_tiles = 0; },
+                 [](TileJob& job) { job.calibration.width_px = 0; },
+                 [](TileJob& job) { job.calibration.width_px = 1 << 20; },
+                 [](TileJob& job) { job.calibration.height_px = kLow; },
+                 [](TileJob& job) { job.calibration.fx_px = std::numeric_limits<double>::quiet_NaN(); },
+                 [](TileJob& job) { job.calibration.sensor = static_cast<SensorType>(77); },
+                 [](TileJob& job) { job.options.num_features = kHuge; },
+                 [](TileJob& job) { job.options.num_levels = 99; },
+                 [](TileJob& job) { job.options.min_score = 0; },
+                 [](TileJob& job) { job.options.max_disparity_px = kHuge; },
+                 [](TileJob& job) { job.first_level = -1; },
+                 [](TileJob& job) { job.last_level = job.options.num_levels; },
+                 [](TileJob& job) { job.first_level = job.last_level + 1; },
+                 [](TileJob& job) { job.core.x = -1; },
+                 [](TileJob& job) { job.core.width = kHuge; },
+                 [](TileJob& job) { job.core.height = -5; },
+                 [](TileJob& job) { job.core = {kHuge, kHuge, kHuge, kHuge}; },
+                 [](TileJob& job) { job.core = {kLow, kLow, kLow, kLow}; }},
+                SensorType::kMono);
 }
 
 TEST(CheckTileJob, RefusesMissingPixels) {
-  ExpectRefused({[](TileJob& job) { job.left.pixels.pop_back(); },
-                 [](TileJob& job) { job.left.width -= 1; },
-                 [](TileJob& job) { job.left = {}; },
-                 [](TileJob& job) { job.left_rect.x -= 1; },
-                 [](TileJob& job) { job.left_rect.x += 1; },
-                 [](TileJob& job) { job.left_rect.y = -1; },
-                 [](TileJob& job) { job.last_level += 1; },
-                 [](TileJob& job) { job.core = {0, 0, 640, 480}; },
+  ExpectRefused({[](TileJob& job) { job.left.pixels.pop_back(); }, [](TileJob& job) { job.left.width -= 1; },
+                 [](TileJob& job) { job.left = {}; }, [](TileJob& job) { job.left_rect.x -= 1; },
+                 [](TileJob& job) { job.left_rect.x += 1; }, [](TileJob& job) { job.left_rect.y = -1; },
+                 [](TileJob& job) { job.last_level += 1; }, [](TileJob& job) { job.core = {0, 0, 640, 480}; },
                  [](TileJob& job) {
                    job.left_rect.width -= 1;
                    job.left = GrayImage(job.left_rect.width, job.left_rect.height);
                  }},
                 SensorType::kMono);
-  ExpectRefused({[](TileJob& job) { job.right = {}; },
-                 [](TileJob& job) { job.right_rect.x += 1; },
-                 [](TileJob& job) { job.options.max_disparity_px += 40; },
-                 [](TileJob& job) { job.right_rect = {}; }},
+  ExpectRefused({[](TileJob& job) { job.right = {}; }, [](TileJob& job) { job.right_rect.x += 1; },
+                 [](TileJob& job) { job.options.max_disparity_px += 40; }, [](TileJob& job) { job.right_rect = {}; }},
                 SensorType::kStereo);
-  ExpectRefused({[](TileJob& job) { job.depth = {}; },
-                 [](TileJob& job) { job.depth_rect.y += 1; },
-                 [](TileJob& job) { job.depth.pixels.push_back(1); },
-                 [](TileJob& job) { job.depth_rect = {}; }},
+  ExpectRefused({[](TileJob& job) { job.depth = {}; }, [](TileJob& job) { job.depth_rect.y += 1; },
+                 [](TileJob& job) { job.depth.pixels.push_back(1); }, [](TileJob& job) { job.depth_rect = {}; }},
                 SensorType::kRgbd);
 }
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "geometry/synthetic_views.h"
+#include "support/synthetic_views.h"
 
 namespace tessera {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "geometry/pose_optimization.h"
 #include "geometry/rigid3.h"
-#include "geometry/synthetic_views.h"
 #include "geometry/triangulation.h"
+#include "support/synthetic_views.h"
 
 namespace tessera {
 namespace {
@@ -29,7 +29,8 @@ TEST(Reproject, JacobianIsTheNumericOne) {
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3d step = 1e-5 * Eigen::Vector3d::Unit(axis);
       const Eigen::Vector3d numeric = (ReprojectionResidual(camera, kBaseline, point + step, seen) -
-                                       ReprojectionResidual(camera, kBaseline, point - step, seen)) / 2e-5;
+                                       ReprojectionResidual(camera, kBaseline, point - step, seen)) /
+                                      2e-5;
       EXPECT_LT((analytic.by_point.col(axis) - numeric).norm(), 1e-6) << axis;
     }
     EXPECT_EQ(analytic.by_point.row(2).isZero(0.0), !has_right);
@@ -100,8 +101,8 @@ TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
   const auto cost = [&](const Eigen::Matrix<double, 6, 1>& delta) {
     double sum = 0.0;
     for (const PoseObservation& o : observations) {
-      sum += ReprojectionResidual(MakeCamera(), kBaseline, Retract(truth, delta) * o.point_in_world, o.seen)
-                 .squaredNorm();
+      sum +=
+          ReprojectionResidual(MakeCamera(), kBaseline, Retract(truth, delta) * o.point_in_world, o.seen).squaredNorm();
     }
     return 0.5 * sum;
   };

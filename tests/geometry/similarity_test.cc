@@ -6,8 +6,8 @@
 #include <numeric>
 
 #include "core/sha256.h"
-#include "geometry/synthetic_views.h"
-#include "other_process.h"
+#include "support/other_process.h"
+#include "support/synthetic_views.h"
 
 namespace tessera {
 namespace {
@@ -22,9 +22,9 @@ struct WorldOptions {
   Rigid3 motion{ExpSO3({0.05, -0.3, 0.1}), {0.4, -0.2, 0.6}};  // first_from_second in the first map's unit
   size_t num_pairs = 150;
   double noise_px = 0.0;
-  double depth_noise = 0.0;    // of each map's points, along the ray, as a part of the depth
-  size_t outlier_step = 0;     // every outlier_step-th pair joins different points (0: none)
-  double baseline_m = 0.0;     // > 0: with right columns
+  double depth_noise = 0.0;  // of each map's points, along the ray, as a part of the depth
+  size_t outlier_step = 0;   // every outlier_step-th pair joins different points (0: none)
+  double baseline_m = 0.0;   // > 0: with right columns
   uint64_t seed = 5;
 };
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "geometry/synthetic_views.h"
+#include "support/synthetic_views.h"
 
 namespace tessera {
 namespace {

@@ -47,7 +47,8 @@ MapDelta RandomStep(Map& map, std::mt19937& generator) {
         break;
       case 2:
       case 3:
-        if (map.landmarks().Has(any) && map.keyframes().Has(seer) && !Sees(map, seer, any) && FreeKeypoint(map, seer) >= 0) {
+        if (map.landmarks().Has(any) && map.keyframes().Has(seer) && !Sees(map, seer, any) &&
+            FreeKeypoint(map, seer) >= 0) {
           editor.AddObservation(any, {seer, FreeKeypoint(map, seer)});
         }
         break;

@@ -6,8 +6,8 @@
 #include <random>
 
 #include "map/map_archive.h"
-#include "map/random_changes.h"
 #include "map/removed_keyframes.h"
+#include "support/random_changes.h"
 
 namespace tessera {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "map/random_changes.h"
+#include "support/random_changes.h"
 
 namespace tessera {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "map/map_editor.h"
-#include "map/small_maps.h"
+#include "support/small_maps.h"
 
 namespace tessera {
 namespace {

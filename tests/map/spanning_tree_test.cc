@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "map/small_maps.h"
+#include "support/small_maps.h"
 
 namespace tessera {
 namespace {

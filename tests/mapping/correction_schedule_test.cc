@@ -1,4 +1,4 @@
-#include "stages/mapper/correction_schedule.h"
+#include "mapping/correction_schedule.h"
 
 #include <gtest/gtest.h>
 
@@ -36,8 +36,9 @@ std::string Describe(int64_t keyframe, const DueCorrections& due) {
   return words + "\n";
 }
 
-// A mapper that asks for an adjustment when it closed a loop and none is on its way, and gets answers whenever `deliver`
-// is called; those of keyframes that it has not processed yet may come too (from before it was started again).
+// A mapper that asks for an adjustment when it closed a loop and none is on its way, and gets answers whenever
+// `deliver` is called; those of keyframes that it has not processed yet may come too (from before it was started
+// again).
 class MapperRun {
  public:
   explicit MapperRun(int64_t num_keyframes) : num_keyframes_(num_keyframes) {}

@@ -1,4 +1,4 @@
-#include "stages/mapper/map_bending.h"
+#include "mapping/map_bending.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "map/spanning_tree.h"
-#include "mapping/planted_map.h"
 #include "optimization/global_adjustment.h"
+#include "support/planted_map.h"
 
 namespace tessera {
 namespace {
@@ -61,7 +61,8 @@ class TwoVisits {
  public:
   TwoVisits(SyntheticWorld& world, const Sim3& second_from_truth) : planted_(world) {
     for (int64_t k = 0; k < 4; ++k) planted_.Add(k, {k - 1}, 0);
-    for (int64_t k = 4; k < 8; ++k) planted_.Add(k - 4, k == 4 ? KeyframeId{} : KeyframeId{k - 1}, 1, second_from_truth);
+    for (int64_t k = 4; k < 8; ++k)
+      planted_.Add(k - 4, k == 4 ? KeyframeId{} : KeyframeId{k - 1}, 1, second_from_truth);
     // Keyframe 7 came back to where keyframe 3 was, and the second part moves onto the first.
     loop_.answers = {7};
     loop_.matched = {3};
@@ -181,7 +182,9 @@ TEST(MapBending, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
   PlantedMap planted(world);
   for (int64_t k = 0; k < 4; ++k) planted.Add(k, {k - 1});
   const AdjustmentBase base = TakeBase(planted.map());
-  const auto shift = [](int64_t k) { return Rigid3{ExpSO3({0.0, 0.01 * static_cast<double>(k), 0.0}), {0.0, 0.1, 0.0}}; };
+  const auto shift = [](int64_t k) {
+    return Rigid3{ExpSO3({0.0, 0.01 * static_cast<double>(k), 0.0}), {0.0, 0.1, 0.0}};
+  };
   GlobalAdjustment adjustment;
   adjustment.answers = {3};
   adjustment.is_usable = true;
@@ -243,7 +246,8 @@ TEST(GlobalAdjustment, BringsABentMapNearerToTheTruth) {
     ASSERT_TRUE(adjustment.is_usable);
     EXPECT_EQ(adjustment.answers, KeyframeId{12});
     EditBoth(map, [&](MapEditor& editor) { ApplyAdjustment(adjustment, TakeBase(map), editor); });
-    // Mono: the root stays, and so does the length of the second keyframe's way, so the scale is known to a few percent.
+    // Mono: the root stays, and so does the length of the second keyframe's way, so the scale is known to a few
+    // percent.
     const double share = sensor == SensorType::kStereo ? 0.1 : 0.3;
     EXPECT_LT(planted.WorstKeyframe(map), share * before) << ToString(sensor);
   }
@@ -257,7 +261,8 @@ TEST(GlobalAdjustment, MovesOnlyThePartThatWasAskedFor) {
   for (const auto& pose : adjustment.poses) {
     EXPECT_EQ(RootOf(map, pose.id), KeyframeId{4});
     if (pose.id != KeyframeId{4}) continue;
-    EXPECT_LT((pose.world_from_camera.translation - map.FindKeyframe({4})->world_from_camera.translation).norm(), 1e-12);
+    EXPECT_LT((pose.world_from_camera.translation - map.FindKeyframe({4})->world_from_camera.translation).norm(),
+              1e-12);
   }
   for (const auto& point : adjustment.points) {
     EXPECT_GE(map.ObservationsOf(point.id).front().keyframe.value, 4);

@@ -5,17 +5,17 @@
 #include <memory>
 
 #include "map/spanning_tree.h"
-#include "mapping/planted_map.h"
+#include "mapping/mapper.h"
 #include "optimization/global_adjustment.h"
-#include "stages/mapper/mapper.h"
+#include "support/planted_map.h"
 
 namespace tessera {
 namespace {
 
 const Sim3 kAway{1.0, ExpSO3({0.0, 0.6, 0.0}), {30.0, 1.0, -3.0}};
 
-// A mapper whose map holds a place twice: keyframes 0 .. 5, and 6 .. 11 in another part, far from it. The next ones go on in
-// the second part.
+// A mapper whose map holds a place twice: keyframes 0 .. 5, and 6 .. 11 in another part, far from it. The next ones go
+// on in the second part.
 class LoopMapper : public testing::Test {
  protected:
   LoopMapper() {
@@ -61,8 +61,9 @@ class LoopMapper : public testing::Test {
     loop.matched = matched;
     loop.matched_from_current = Sim3::From(planted_.Between(matched, current));
     loop.joins_parts = true;
-    const Sim3 new_from_old = Sim3::From(map.FindKeyframe(matched)->world_from_camera * planted_.Between(matched, current) *
-                                         map.FindKeyframe(current)->world_from_camera.Inverse());
+    const Sim3 new_from_old =
+        Sim3::From(map.FindKeyframe(matched)->world_from_camera * planted_.Between(matched, current) *
+                   map.FindKeyframe(current)->world_from_camera.Inverse());
     map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
       if (RootOf(map, id) == RootOf(map, current)) loop.corrections.push_back({id, new_from_old});
     });

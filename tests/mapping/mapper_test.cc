@@ -1,4 +1,4 @@
-#include "stages/mapper/mapper.h"
+#include "mapping/mapper.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "mapping/synthetic_world.h"
+#include "support/synthetic_world.h"
 
 namespace tessera {
 namespace {
@@ -33,8 +33,7 @@ class Drive {
     for (size_t i = 0; i < picture.points.size(); ++i) {
       const auto before = last_keypoints_.find(picture.points[i]);
       if (before == last_keypoints_.end() || picture.points[i] % known_ != 0) continue;
-      seen.shared.push_back(
-          {static_cast<int32_t>(i), seen.reference, before->second, world_.point(picture.points[i])});
+      seen.shared.push_back({static_cast<int32_t>(i), seen.reference, before->second, world_.point(picture.points[i])});
     }
     last_keypoints_.clear();
     for (size_t i = 0; i < picture.points.size(); ++i) last_keypoints_[picture.points[i]] = static_cast<int32_t>(i);

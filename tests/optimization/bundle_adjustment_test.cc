@@ -8,8 +8,8 @@
 #include <limits>
 #include <numeric>
 
-#include "optimization/synthetic_bundle.h"
-#include "optimization/synthetic_street.h"
+#include "support/synthetic_bundle.h"
+#include "support/synthetic_street.h"
 
 namespace tessera {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "optimization/synthetic_bundle.h"
+#include "support/synthetic_bundle.h"
 
 namespace tessera {
 namespace {
@@ -73,9 +73,7 @@ struct CostAt {
 };
 
 void ExpectSame(const Eigen::MatrixXd& analytic, const Eigen::MatrixXd& numeric) {
-  EXPECT_LT((analytic - numeric).norm(), 1e-7 * numeric.norm()) << "analytic\n"
-                                                                << analytic << "\nnumeric\n"
-                                                                << numeric;
+  EXPECT_LT((analytic - numeric).norm(), 1e-7 * numeric.norm()) << "analytic\n" << analytic << "\nnumeric\n" << numeric;
 }
 
 MovingPose RandomPose(std::mt19937_64& generator, const double* tangent) {

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "optimization/pose_graph_costs.h"
-#include "optimization/synthetic_bundle.h"
-#include "optimization/synthetic_circuit.h"
+#include "support/synthetic_bundle.h"
+#include "support/synthetic_circuit.h"
 
 namespace tessera {
 namespace {
@@ -31,8 +31,8 @@ PoseGraphOptions Exhaustive() { return {.max_num_iterations = 200, .function_tol
 
 // A graph that its truth fulfils exactly, started away from it.
 SyntheticCircuit MakeConsistentGraph(bool has_scale) {
-  SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = 40, .step_m = 2.0, .has_scale = has_scale,
-                                                   .log_scale_sigma = 0.02});
+  SyntheticCircuit circuit =
+      MakeSyntheticCircuit({.num_keyframes = 40, .step_m = 2.0, .has_scale = has_scale, .log_scale_sigma = 0.02});
   for (PoseGraphEdge& edge : circuit.problem.edges) {
     edge.to_from_from = circuit.world_from_keyframe[static_cast<size_t>(edge.to)].Inverse() *
                         circuit.world_from_keyframe[static_cast<size_t>(edge.from)];
@@ -53,9 +53,12 @@ TEST(OptimizePoseGraph, ConsistentEdgesGiveTheTruth) {
 // One loop at the end of a long open path. Twenty iterations are enough to spread its error for good.
 TEST(OptimizePoseGraph, LongChainsConvergeInTheIterationsGiven) {
   for (const int num_keyframes : {300, 1000, 3000}) {
-    const SyntheticCircuit circuit = MakeSyntheticCircuit(
-        {.num_keyframes = num_keyframes, .step_m = 2.0, .num_neighbours = 2, .rotation_sigma_rad = 0.0003,
-         .log_scale_sigma = 0.002, .log_scale_drift = 0.5});
+    const SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = num_keyframes,
+                                                           .step_m = 2.0,
+                                                           .num_neighbours = 2,
+                                                           .rotation_sigma_rad = 0.0003,
+                                                           .log_scale_sigma = 0.002,
+                                                           .log_scale_drift = 0.5});
     const auto poses = OptimizePoseGraph(circuit.problem, {}), limit = OptimizePoseGraph(circuit.problem, Exhaustive());
     ASSERT_TRUE(poses && limit);
     const double before = CircuitError(circuit, PosesOf(circuit.problem), 1.0);

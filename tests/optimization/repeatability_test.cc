@@ -4,9 +4,9 @@
 #include "core/sha256.h"
 #include "optimization/bundle_adjustment.h"
 #include "optimization/pose_graph.h"
-#include "optimization/synthetic_circuit.h"
-#include "optimization/synthetic_street.h"
-#include "other_process.h"
+#include "support/other_process.h"
+#include "support/synthetic_circuit.h"
+#include "support/synthetic_street.h"
 
 namespace tessera {
 namespace {

@@ -43,7 +43,8 @@ Bags RandomBags(int count, uint64_t seed) {
 int32_t CountCommon(const BagOfWords& a, const BagOfWords& b) {
   int32_t count = 0;
   for (const auto& [word, weight] : a.words) {
-    count += std::any_of(b.words.begin(), b.words.end(), [&](const auto& other) { return other.first == word; }) ? 1 : 0;
+    count +=
+        std::any_of(b.words.begin(), b.words.end(), [&](const auto& other) { return other.first == word; }) ? 1 : 0;
   }
   return count;
 }

@@ -1,8 +1,8 @@
 // The vocabulary that comes with the project.
 #include <gtest/gtest.h>
 
-#include "place_recognition/planted_descriptors.h"
 #include "place_recognition/vocabulary.h"
+#include "support/planted_descriptors.h"
 
 namespace tessera {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "core/errors.h"
-#include "place_recognition/planted_descriptors.h"
 #include "place_recognition/vocabulary.h"
 #include "place_recognition/vocabulary_training.h"
+#include "support/planted_descriptors.h"
 
 namespace tessera {
 namespace {
@@ -92,7 +92,8 @@ TEST_F(VocabularyFileTest, RefusesAnotherVersionByItsNumber) {
 }
 
 TEST_F(VocabularyFileTest, RefusesWhatIsNoVocabulary) {
-  EXPECT_NE(Refusal("%YAML 1.2\nthis: is a text of some other kind, long enough to hold a header\n").find("is not a vocabulary"),
+  EXPECT_NE(Refusal("%YAML 1.2\nthis: is a text of some other kind, long enough to hold a header\n")
+                .find("is not a vocabulary"),
             std::string::npos);
   EXPECT_THROW(Vocabulary::Load(folder_ / "missing.tvoc"), InputError);
   EXPECT_THROW(Vocabulary::Load(folder_), InputError);

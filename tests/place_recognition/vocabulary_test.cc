@@ -7,8 +7,8 @@
 #include <set>
 #include <stdexcept>
 
-#include "place_recognition/planted_descriptors.h"
 #include "place_recognition/vocabulary_training.h"
+#include "support/planted_descriptors.h"
 
 namespace tessera {
 namespace {

@@ -6,13 +6,14 @@
 #include <set>
 #include <stdexcept>
 
-#include "place_recognition/planted_descriptors.h"
+#include "support/planted_descriptors.h"
 
 namespace tessera {
 namespace {
 
 // Images that hold one noisy copy of each centre.
-std::vector<std::vector<Descriptor>> ImagesAround(const std::vector<Descriptor>& centers, int num_images, int num_flips) {
+std::vector<std::vector<Descriptor>> ImagesAround(const std::vector<Descriptor>& centers, int num_images,
+                                                  int num_flips) {
   std::mt19937_64 generator(99);
   std::vector<std::vector<Descriptor>> images(static_cast<size_t>(num_images));
   for (auto& image : images) {

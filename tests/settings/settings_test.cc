@@ -18,8 +18,8 @@ class SettingsTest : public testing::Test {
     return path.string();
   }
   Settings Example() {
-    return Settings::LoadDefaults(Write("defaults.yaml",
-                                        "camera:\n  source: \"\"\n  window: 6\n  factor: 1.5\n  on: true\n"));
+    return Settings::LoadDefaults(
+        Write("defaults.yaml", "camera:\n  source: \"\"\n  window: 6\n  factor: 1.5\n  on: true\n"));
   }
 };
 

@@ -26,7 +26,8 @@ struct Scene {
   const char* name;
   SensorType sensor;
 };
-constexpr Scene kScenes[] = {{"street", SensorType::kStereo}, {"street-short", SensorType::kMono}, {"room", SensorType::kRgbd}};
+constexpr Scene kScenes[] = {
+    {"street", SensorType::kStereo}, {"street-short", SensorType::kMono}, {"room", SensorType::kRgbd}};
 
 TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
   for (const Scene& scene : kScenes) {
@@ -44,7 +45,9 @@ TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
 TEST(Simulation, AnotherProcessRendersTheSame) {
   int pipe_ends[2];
   ASSERT_EQ(pipe(pipe_ends), 0);
-  const auto hash = [] { return HashOfFrame(Simulation(Small("street-short"), SensorType::kStereo).Render(FrameId{17})); };
+  const auto hash = [] {
+    return HashOfFrame(Simulation(Small("street-short"), SensorType::kStereo).Render(FrameId{17}));
+  };
   const pid_t child = fork();
   if (child == 0) {
     const std::string own = hash();
@@ -74,13 +77,15 @@ Sample SampleAt(const Rendering& r, const Eigen::Vector2d& p) {
   const double low = std::min({grey(0, 0), grey(1, 0), grey(0, 1), grey(1, 1)});
   const double high = std::max({grey(0, 0), grey(1, 0), grey(0, 1), grey(1, 1)});
   return {(1 - v) * ((1 - u) * grey(0, 0) + u * grey(1, 0)) + v * ((1 - u) * grey(0, 1) + u * grey(1, 1)),
-          static_cast<double>(r.inverse_depth.row(static_cast<int>(std::lround(p.y())))[static_cast<int>(std::lround(p.x()))]),
+          static_cast<double>(
+              r.inverse_depth.row(static_cast<int>(std::lround(p.y())))[static_cast<int>(std::lround(p.x()))]),
           high - low};
 }
 
 // Sends every pixel of one picture by its depth into another; where the other sees the same place, it must see the same
 // grey, but for what lies between its own pixels. Returns the share of pixels that were compared.
-double ExpectSameGrey(const CameraCalibration& camera, const Rendering& from, const Rendering& to, const Rigid3& to_from_from) {
+double ExpectSameGrey(const CameraCalibration& camera, const Rendering& from, const Rendering& to,
+                      const Rigid3& to_from_from) {
   int num_compared = 0, num_different = 0;
   double sum_squared = 0.0;
   for (int y = 0; y < camera.height_px; ++y) {
@@ -111,7 +116,8 @@ TEST(Simulation, DepthAndPoseExplainTheNextImage) {
       Rendering from, to;
       simulation.RenderPerfect(FrameId{number}, from);
       simulation.RenderPerfect(FrameId{number + 1}, to);
-      const Rigid3 to_from_from = simulation.WorldFromCamera(FrameId{number + 1}).Inverse() * simulation.WorldFromCamera(FrameId{number});
+      const Rigid3 to_from_from =
+          simulation.WorldFromCamera(FrameId{number + 1}).Inverse() * simulation.WorldFromCamera(FrameId{number});
       EXPECT_GT(ExpectSameGrey(simulation.calibration(), from, to, to_from_from), 0.5) << scene.name << " " << number;
     }
   }
@@ -140,9 +146,11 @@ TEST(Simulation, TheDriveKeepsItsDistance) {
   Rendering rendering;
   for (int64_t frame = 0; frame < simulation.num_frames(); frame += 97) {
     simulation.RenderPerfect(FrameId{frame}, rendering);
-    const float nearest = *std::max_element(rendering.inverse_depth.pixels.begin(), rendering.inverse_depth.pixels.end());
+    const float nearest =
+        *std::max_element(rendering.inverse_depth.pixels.begin(), rendering.inverse_depth.pixels.end());
     EXPECT_LT(nearest, 1.0F / 1.2F) << frame;
-    const Rigid3 step = simulation.WorldFromCamera(FrameId{frame}).Inverse() * simulation.WorldFromCamera(FrameId{std::min(frame + 1, simulation.num_frames() - 1)});
+    const Rigid3 step = simulation.WorldFromCamera(FrameId{frame}).Inverse() *
+                        simulation.WorldFromCamera(FrameId{std::min(frame + 1, simulation.num_frames() - 1)});
     EXPECT_LT(step.translation.norm(), 0.9) << frame;
   }
 }
@@ -156,8 +164,9 @@ TEST(ParseSimulation, ReadsOptions) {
 }
 
 TEST(ParseSimulation, RefusesNonsense) {
-  for (const char* text : {"", "moon", "street,", "street,seed", "street,seed=x", "street,seed=-1", "street,speed=0",
-                           "street,noise=-1", "street,scale=100", "room,colour=1", "street,length=nan", "street,seed=3 "}) {
+  for (const char* text :
+       {"", "moon", "street,", "street,seed", "street,seed=x", "street,seed=-1", "street,speed=0", "street,noise=-1",
+        "street,scale=100", "room,colour=1", "street,length=nan", "street,seed=3 "}) {
     EXPECT_THROW(ParseSimulation(text), InputError) << text;
   }
   EXPECT_THROW(Simulation(ParseSimulation("street,path=/nowhere"), SensorType::kMono), InputError);

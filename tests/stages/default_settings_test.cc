@@ -2,9 +2,9 @@
 // algorithms, everything runs alike.
 #include <gtest/gtest.h>
 
+#include "loop_closing/loop_closer.h"
+#include "mapping/mapper.h"
 #include "settings/settings.h"
-#include "stages/loop_closer/loop_closer.h"
-#include "stages/mapper/mapper.h"
 #include "tracking/map_tracker.h"
 
 namespace tessera {

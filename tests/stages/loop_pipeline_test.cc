@@ -1,5 +1,5 @@
-// The whole pipeline with loop closer and global adjuster over memq:// in one process: a camera that is carried off, begins
-// another part of the map, and comes back.
+// The whole pipeline with loop closer and global adjuster over memq:// in one process: a camera that is carried off,
+// begins another part of the map, and comes back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,24 +11,24 @@
 #include <string>
 #include <vector>
 
+#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/global_adjuster/global_adjuster_stage.h"
 #include "stages/loop_closer/loop_closer_stage.h"
 #include "stages/mapper/mapper_stage.h"
-#include "stages/moving_scene.h"
 #include "stages/reassembler/reassembler_stage.h"
-#include "stages/run_folder.h"
 #include "stages/tracker/tracker_stage.h"
-#include "transport/memory_bus.h"
+#include "support/moving_scene.h"
+#include "support/run_folder.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kNumFirst = 20;       // frames of the first part, a step each
-constexpr int kFarStep = 200;       // to where the camera is carried then: nothing of the first part is in sight
-constexpr int kStepsPerFrame = 2;   // on the way back
+constexpr int kNumFirst = 20;      // frames of the first part, a step each
+constexpr int kFarStep = 200;      // to where the camera is carried then: nothing of the first part is in sight
+constexpr int kStepsPerFrame = 2;  // on the way back
 constexpr int64_t kNumFrames = kNumFirst + kFarStep / kStepsPerFrame;
 
 int StepOf(int64_t frame) {
@@ -166,8 +166,8 @@ const nlohmann::json& Reference() {
 
 void ExpectSame(const nlohmann::json& figures) {
   ASSERT_FALSE(figures.is_null()) << "the run did not end";
-  for (const char* key : {"frames", "frames_tracked", "tracking_failures", "keyframes", "landmarks", "trajectory_sha256",
-                          "map_sha256"}) {
+  for (const char* key :
+       {"frames", "frames_tracked", "tracking_failures", "keyframes", "landmarks", "trajectory_sha256", "map_sha256"}) {
     EXPECT_EQ(figures[key], Reference()[key]) << key;
   }
 }

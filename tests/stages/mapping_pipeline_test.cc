@@ -9,16 +9,16 @@
 
 #include "evaluation/map_text.h"
 #include "map/map.h"
+#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/map_writer/map_writer_stage.h"
 #include "stages/mapper/mapper_stage.h"
-#include "stages/moving_scene.h"
 #include "stages/reassembler/reassembler_stage.h"
-#include "stages/run_folder.h"
 #include "stages/tracker/tracker_stage.h"
-#include "transport/memory_bus.h"
+#include "support/moving_scene.h"
+#include "support/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -32,7 +32,7 @@ Settings SettingsOf(const RunFolder& folder, const std::string& tiles) {
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
   settings.Override("tracker.keyframe_min_share=0.9");  // a short way, and yet many keyframes
-  settings.Override("tracker.relocalize=false");  // nobody is there to answer
+  settings.Override("tracker.relocalize=false");        // nobody is there to answer
   settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());
   settings.Override("map_writer.path=" + folder.File("late.ply"));
@@ -52,9 +52,8 @@ class StackRun {
       poses_.push_back(pose);
       SendMore();
     });
-    camera_.Subscribe<StageStatus>(kStatusChannel, [this](const StageStatus& status, const MessageInfo&) {
-      statuses_[status.name] = status;
-    });
+    camera_.Subscribe<StageStatus>(
+        kStatusChannel, [this](const StageStatus& status, const MessageInfo&) { statuses_[status.name] = status; });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<MapperStage>("mapper");
     bus_.Start<TrackerStage>("tracker");
@@ -115,8 +114,8 @@ const nlohmann::json& Reference() {
 }
 
 void ExpectSame(const nlohmann::json& figures) {
-  for (const char* key : {"frames", "frames_tracked", "frames_dropped", "keyframes", "landmarks", "trajectory_sha256",
-                          "map_sha256"}) {
+  for (const char* key :
+       {"frames", "frames_tracked", "frames_dropped", "keyframes", "landmarks", "trajectory_sha256", "map_sha256"}) {
     EXPECT_EQ(figures[key], Reference()[key]) << key;
   }
 }

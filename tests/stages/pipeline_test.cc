@@ -7,12 +7,12 @@
 #include "features/extractor.h"
 #include "features/selection.h"
 #include "features/tiling.h"
-#include "map/tracking_types.h"
+#include "messages/tracking_types.h"
+#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
-#include "stages/synthetic_image.h"
-#include "transport/memory_bus.h"
+#include "support/synthetic_image.h"
 
 namespace tessera {
 namespace {

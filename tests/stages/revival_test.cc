@@ -9,17 +9,17 @@
 #include <random>
 #include <string>
 
-#include "map/tracking_types.h"
+#include "messages/tracking_types.h"
+#include "runtime/memory_bus.h"
 #include "stages/camera/camera_stage.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/mapper/mapper_stage.h"
-#include "stages/moving_scene.h"
 #include "stages/reassembler/reassembler_stage.h"
-#include "stages/run_folder.h"
 #include "stages/tracker/tracker_stage.h"
-#include "transport/memory_bus.h"
+#include "support/moving_scene.h"
+#include "support/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -51,9 +51,9 @@ class Sequence {
       times << 0.1 * static_cast<double>(id) << "\n";
       poses << "1 0 0 " << MovingScene::kStepM * static_cast<double>(id) << " 0 1 0 0 0 0 1 0\n";
     }
-    std::ofstream(folder_.File("03/calib.txt")) << "P0: 300 0 160 0 0 300 120 0 0 0 1 0\n"
-                                                << "P1: 300 0 160 " << -300 * MovingScene::kBaselineM
-                                                << " 0 300 120 0 0 0 1 0\n";
+    std::ofstream(folder_.File("03/calib.txt"))
+        << "P0: 300 0 160 0 0 300 120 0 0 0 1 0\n"
+        << "P1: 300 0 160 " << -300 * MovingScene::kBaselineM << " 0 300 120 0 0 0 1 0\n";
   }
   std::string path() const { return folder_.File("03"); }
 
@@ -85,9 +85,8 @@ class StackRun {
     probe.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
       last_pose_ = std::max(last_pose_, pose.frame);
     });
-    probe.Subscribe<MapSnapshotPage>(kMapSnapshotChannel, [this](const MapSnapshotPage& page, const MessageInfo&) {
-      snapshot_ = page.part.number;
-    });
+    probe.Subscribe<MapSnapshotPage>(
+        kMapSnapshotChannel, [this](const MapSnapshotPage& page, const MessageInfo&) { snapshot_ = page.part.number; });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<MapperStage>("mapper");
     bus_.Start<TrackerStage>("tracker");
@@ -133,8 +132,8 @@ void ExpectSame(const nlohmann::json& figures) {
   ASSERT_EQ(reference["frames_tracked"], kNumFrames);
   ASSERT_GT(reference["keyframes"], 4);
   ASSERT_FALSE(figures.is_null()) << "the run did not end";
-  for (const char* key : {"frames", "frames_tracked", "frames_dropped", "keyframes", "landmarks",
-                          "trajectory_sha256", "map_sha256"}) {
+  for (const char* key :
+       {"frames", "frames_tracked", "frames_dropped", "keyframes", "landmarks", "trajectory_sha256", "map_sha256"}) {
     EXPECT_EQ(figures[key], reference[key]) << key;
   }
 }

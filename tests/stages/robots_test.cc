@@ -12,12 +12,12 @@
 #include "features/extractor.h"
 #include "features/selection.h"
 #include "features/tiling.h"
-#include "map/tracking_types.h"
+#include "messages/tracking_types.h"
+#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
-#include "stages/synthetic_image.h"
-#include "transport/memory_bus.h"
+#include "support/synthetic_image.h"
 
 namespace tessera {
 namespace {
@@ -32,7 +32,8 @@ struct Robot {
   unsigned seed = 0;  // of its images
 };
 const Robot kStereoRobot{.prefix = "a_", .tiles = "1x1", .sensor = SensorType::kStereo, .seed = 100};
-const Robot kMonoRobot{.prefix = "b_", .tiles = "2x4", .width_px = 200, .height_px = 160, .num_frames = 14, .seed = 200};
+const Robot kMonoRobot{
+    .prefix = "b_", .tiles = "2x4", .width_px = 200, .height_px = 160, .num_frames = 14, .seed = 200};
 
 CameraCalibration CalibrationOf(const Robot& robot) {
   return {.sensor = robot.sensor,
@@ -225,8 +226,8 @@ TEST(Robots, ANamesakeUnderOnePrefixLeavesTheOtherRobotsAlone) {
 TEST(Robots, AListOfThemThatMakesNoSenseIsRefused) {
   for (const std::string robots : {",", "a_,,b_", "a_,a_", "a b", "own_"}) {
     MemoryBus bus(Defaults());
-    EXPECT_THROW(
-        bus.Start<ExtractorStage>("extractor_0", 0, {"extractor.robots=" + robots, "bus.channel_prefix=own_"}), InputError)
+    EXPECT_THROW(bus.Start<ExtractorStage>("extractor_0", 0, {"extractor.robots=" + robots, "bus.channel_prefix=own_"}),
+                 InputError)
         << robots;
   }
 }

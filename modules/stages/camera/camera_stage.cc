@@ -4,7 +4,7 @@
 #include <exception>
 
 #include "core/errors.h"
-#include "map/tracking_types.h"
+#include "messages/tracking_types.h"
 #include "stages/camera/log_source.h"
 
 namespace tessera {
@@ -31,9 +31,8 @@ SourceOptions SourceOptionsFrom(const Settings& settings) {
 
 std::unique_ptr<FrameSource> Open(const Settings& settings) {
   const SourceOptions options = SourceOptionsFrom(settings);
-  return options.source.starts_with("log:")
-             ? OpenLog(options, settings.Get<std::string>("bus.channel_prefix"))
-             : OpenSource(options);
+  return options.source.starts_with("log:") ? OpenLog(options, settings.Get<std::string>("bus.channel_prefix"))
+                                            : OpenSource(options);
 }
 
 PacerOptions PacerOptionsFrom(const Settings& settings, bool is_live) {
@@ -167,11 +166,9 @@ void CameraStage::End() {
 }
 
 void CameraStage::WatchPoses() {
-  const bool is_stuck =
-      !has_ended_ && pacer_.num_ahead() > 0 && context_.now_us() - last_progress_us_ > kNoPoseUs;
+  const bool is_stuck = !has_ended_ && pacer_.num_ahead() > 0 && context_.now_us() - last_progress_us_ > kNoPoseUs;
   if (is_stuck && !warned_) {
-    context_.ReportError("no pose has come for 10 s, and in lockstep frame " +
-                         std::to_string(last_sent_.value + 1) +
+    context_.ReportError("no pose has come for 10 s, and in lockstep frame " + std::to_string(last_sent_.value + 1) +
                          " waits for one: is the rest of the stack running?");
   }
   warned_ = is_stuck;

@@ -7,9 +7,10 @@
 #include <optional>
 
 #include "datasets/frame_source.h"
-#include "stages/camera/pacer.h"
-#include "stages/camera/renumbering.h"
-#include "transport/stage.h"
+#include "datasets/pacer.h"
+#include "datasets/renumbering.h"
+#include "messages/end_of_stream.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 

@@ -3,8 +3,8 @@
 #include <deque>
 
 #include "core/errors.h"
-#include "transport/log.h"
-#include "transport/recorded_steps.h"
+#include "wire/log.h"
+#include "wire/recorded_steps.h"
 
 namespace tessera {
 namespace {
@@ -56,13 +56,11 @@ void LogSource::ReadUntilCalibrated() {
   while (!calibration_ || read_ahead_.empty()) {
     std::optional<CameraFrame> frame = ReadFrame();
     if (!calibration_ && (!frame || read_ahead_.size() == kMaxFramesBeforeCalibration)) {
-      throw InputError(options_.source +
-                       " has no CALIBRATION with its first frames: record the camera from its start");
+      throw InputError(options_.source + " has no CALIBRATION with its first frames: record the camera from its start");
     }
     if (!frame) {
-      throw InputError(
-          options_.source + " has no frames in the range " + std::to_string(options_.first_frame) + ":" +
-          (options_.last_frame < 0 ? "" : std::to_string(options_.last_frame)) + ": choose another range");
+      throw InputError(options_.source + " has no frames in the range " + std::to_string(options_.first_frame) + ":" +
+                       (options_.last_frame < 0 ? "" : std::to_string(options_.last_frame)) + ": choose another range");
     }
     read_ahead_.push_back(std::move(*frame));
   }
@@ -75,8 +73,8 @@ void LogSource::CheckOptions() const {
                      "camera.depth_unit_m");
   }
   if (options_.first_frame < 0 || (options_.last_frame >= 0 && options_.last_frame <= options_.first_frame)) {
-    throw InputError("frames " + std::to_string(options_.first_frame) + ":" +
-                     std::to_string(options_.last_frame) + " are none: choose another range");
+    throw InputError("frames " + std::to_string(options_.first_frame) + ":" + std::to_string(options_.last_frame) +
+                     " are none: choose another range");
   }
 }
 
@@ -101,11 +99,9 @@ std::optional<int64_t> LogSource::num_frames() const {
 
 std::optional<CameraFrame> LogSource::ReadFrame() {
   while (std::optional<LoggedValue> value = reader_.Next()) {
-    if (const auto* calibration = std::get_if<CameraCalibration>(&*value);
-        calibration != nullptr && !calibration_) {
+    if (const auto* calibration = std::get_if<CameraCalibration>(&*value); calibration != nullptr && !calibration_) {
       Take(*calibration);
-    } else if (const auto* truth = std::get_if<GroundTruthPose>(&*value);
-               truth != nullptr && IsWanted(truth->frame)) {
+    } else if (const auto* truth = std::get_if<GroundTruthPose>(&*value); truth != nullptr && IsWanted(truth->frame)) {
       ground_truth_.push_back(*truth);
     } else if (auto* frame = std::get_if<CameraFrame>(&*value); frame != nullptr && IsWanted(frame->id)) {
       return std::move(*frame);

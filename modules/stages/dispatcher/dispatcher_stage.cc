@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "core/errors.h"
-#include "map/tracking_types.h"
-#include "transport/stage_messages.h"
+#include "messages/stage_messages.h"
+#include "messages/tracking_types.h"
 
 namespace tessera {
 namespace {
@@ -38,20 +38,20 @@ WorkQueueOptions OptionsFrom(const Settings& settings) {
 
 }  // namespace
 
-DispatcherStage::DispatcherStage(StageContext& context)
-    : context_(context), queue_(OptionsFrom(context.settings())) {
+DispatcherStage::DispatcherStage(StageContext& context) : context_(context), queue_(OptionsFrom(context.settings())) {
   end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  context.Subscribe<CameraCalibration>(
-      kCalibrationChannel, [this](const CameraCalibration& calibration, const MessageInfo&) { OnCalibration(calibration); });
-  context.Subscribe<CameraFrame>(
-      kCameraChannel, [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
+  context.Subscribe<CameraCalibration>(kCalibrationChannel, [this](const CameraCalibration& calibration,
+                                                                   const MessageInfo&) { OnCalibration(calibration); });
+  context.Subscribe<CameraFrame>(kCameraChannel,
+                                 [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
   context.Subscribe<ExtractorReady>(kExtractorReadyChannel, [this](const ExtractorReady& ready, const MessageInfo&) {
     queue_.HearExtractor(ready.extractor, ready.epoch_us, context_.now_us(), ready.num_robots);
     GiveWork();
   });
   context.Subscribe<TileAck>(kTileAckChannel,
                              [this](const TileAck& ack, const MessageInfo& info) { OnAck(ack, info); });
-  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) { OnPose(pose.frame); });
+  context.Subscribe<PoseEstimate>(kPoseChannel,
+                                  [this](const PoseEstimate& pose, const MessageInfo&) { OnPose(pose.frame); });
   context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
     if (end.stage == "camera" && !source_end_) {
       source_end_ = end;
@@ -64,7 +64,8 @@ DispatcherStage::DispatcherStage(StageContext& context)
 
 void DispatcherStage::OnCalibration(const CameraCalibration& calibration) {
   if (calibration_ && *calibration_ != calibration) {
-    context_.ReportError("the calibration changed within a stream; the new one is ignored: restart the stack for another camera");
+    context_.ReportError(
+        "the calibration changed within a stream; the new one is ignored: restart the stack for another camera");
     return;
   }
   if (calibration_) {
@@ -117,7 +118,8 @@ void DispatcherStage::NoteGapBefore(FrameId frame) {
 }
 
 void DispatcherStage::OnPose(FrameId frame) {
-  // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it out.
+  // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it
+  // out.
   if (frame > tracked_ && frame >= gap_begin_ && frame < gap_end_) {
     --num_dropped_;
     context_.AddDropped(-1);

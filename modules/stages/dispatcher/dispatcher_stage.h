@@ -5,9 +5,10 @@
 #include <optional>
 #include <set>
 
+#include "distribution/work_queue.h"
 #include "geometry/camera_frame.h"
-#include "stages/dispatcher/work_queue.h"
-#include "transport/stage.h"
+#include "messages/end_of_stream.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 
@@ -40,11 +41,11 @@ class DispatcherStage {
   std::optional<CameraCalibration> calibration_;
   std::vector<Arrived> before_calibration_;  // frames that overtook it
   std::optional<EndOfStream> source_end_;
-  FrameId newest_;   // highest frame number that came
-  FrameId tracked_;  // this frame, and all before it, have a pose
+  FrameId newest_;                                // highest frame number that came
+  FrameId tracked_;                               // this frame, and all before it, have a pose
   std::optional<int64_t> first_camera_epoch_us_;  // of the first camera heard
   std::optional<int64_t> reassembler_epoch_us_;   // of the last one heard
-  FrameId gap_begin_, gap_end_;  // the frames of the last gap: gap_begin_ .. gap_end_ - 1 did not come
+  FrameId gap_begin_, gap_end_;                   // the frames of the last gap: gap_begin_ .. gap_end_ - 1 did not come
   int64_t num_dropped_ = 0;
   int64_t last_activity_us_ = 0;  // when the last frame came
   bool warned_no_extractor_ = false;

@@ -6,17 +6,17 @@
 
 #include "core/errors.h"
 #include "evaluation/run_files.h"
-#include "map/tracking_types.h"
-#include "transport/map_file.h"
-#include "transport/stage_messages.h"
+#include "messages/stage_messages.h"
+#include "messages/tracking_types.h"
+#include "wire/map_file.h"
 
 namespace tessera {
 namespace {
 
 // Each stage speaks twice a second; the figures of a run are those that it gives after the end.
 constexpr int64_t kMaxWaitForStatusUs = 1'000'000;
-// After the tracker's end, a pose or a change of the map that has not come for this long won't come any more; a global bundle
-// adjustment of a large map takes a minute on a busy machine.
+// After the tracker's end, a pose or a change of the map that has not come for this long won't come any more; a global
+// bundle adjustment of a large map takes a minute on a busy machine.
 constexpr int64_t kLastNewsTimeoutUs = 120'000'000;
 
 StageFigures FiguresOf(const StageStatus& status) {
@@ -49,14 +49,14 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
     FinishIfDone();
   });
   // One that was started again begins with a snapshot of the map, which does not hold all that poses are relative to.
-  context.Subscribe<RemovedInDelta>(kRemovedKeyframesChannel, [this](const RemovedInDelta& removed, const MessageInfo&) {
-    record_.AddRemoved(removed);
-    num_removals_known_ = std::max(num_removals_known_, removed.delta + 1);
-    FinishIfDone();
-  });
+  context.Subscribe<RemovedInDelta>(kRemovedKeyframesChannel,
+                                    [this](const RemovedInDelta& removed, const MessageInfo&) {
+                                      record_.AddRemoved(removed);
+                                      num_removals_known_ = std::max(num_removals_known_, removed.delta + 1);
+                                      FinishIfDone();
+                                    });
   context.Subscribe<GroundTruthPose>(
-      kGroundTruthChannel,
-      [this](const GroundTruthPose& truth, const MessageInfo&) { record_.AddGroundTruth(truth); });
+      kGroundTruthChannel, [this](const GroundTruthPose& truth, const MessageInfo&) { record_.AddGroundTruth(truth); });
   context.Subscribe<EndOfStream>(kEndOfStreamChannel,
                                  [this](const EndOfStream& end, const MessageInfo&) { OnEnd(end); });
   context.Subscribe<StageStatus>(kStatusChannel,

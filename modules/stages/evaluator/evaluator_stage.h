@@ -8,8 +8,8 @@
 #include <string>
 
 #include "evaluation/run_record.h"
-#include "transport/map_subscription.h"
-#include "transport/stage.h"
+#include "runtime/map_subscription.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 
@@ -35,7 +35,7 @@ class EvaluatorStage {
   std::string out_dir_;
   RunRecord record_;
   MapSubscription map_;
-  std::optional<EndOfStream> end_;           // the tracker's
+  std::optional<EndOfStream> end_;  // the tracker's
   std::optional<EndOfStream> mapper_end_;
   FrameId last_pose_;
   int64_t num_removals_known_ = 0;           // what deltas below this number removed is known

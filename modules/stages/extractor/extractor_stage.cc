@@ -21,15 +21,16 @@ std::vector<std::string> OtherRobots(const Settings& settings) {
   std::istringstream words(text);
   for (std::string prefix; std::getline(words, prefix, ',');) {
     if (prefix.empty() || !known.insert(prefix).second) {
-      throw InputError("setting extractor.robots = `" + text +
-                       "` must be channel prefixes with commas between them, such as a_,b_: none empty, none twice, and "
-                       "not bus.channel_prefix, whose robot is served anyway");
+      throw InputError(
+          "setting extractor.robots = `" + text +
+          "` must be channel prefixes with commas between them, such as a_,b_: none empty, none twice, and "
+          "not bus.channel_prefix, whose robot is served anyway");
     }
     robots.push_back(prefix);
   }
   if (robots.size() >= static_cast<size_t>(kMaxRobots)) {
-    throw InputError("setting extractor.robots names " + std::to_string(robots.size()) + " robots; an extractor serves " +
-                     std::to_string(kMaxRobots) + " at most");
+    throw InputError("setting extractor.robots names " + std::to_string(robots.size()) +
+                     " robots; an extractor serves " + std::to_string(kMaxRobots) + " at most");
   }
   return robots;
 }

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "distribution/fair_queue.h"
 #include "features/extractor.h"
-#include "geometry/camera_frame.h"
-#include "stages/extractor/fair_queue.h"
-#include "transport/stage.h"
+#include "messages/end_of_stream.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 

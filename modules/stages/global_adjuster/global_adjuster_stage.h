@@ -3,11 +3,11 @@
 
 #include <optional>
 
-#include "geometry/camera_frame.h"
-#include "map/loop_types.h"
+#include "messages/end_of_stream.h"
+#include "messages/loop_types.h"
 #include "optimization/bundle_adjustment.h"
-#include "transport/map_subscription.h"
-#include "transport/stage.h"
+#include "runtime/map_subscription.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 

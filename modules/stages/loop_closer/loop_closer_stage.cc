@@ -14,7 +14,8 @@ LoopCloserOptions OptionsFrom(const Settings& settings) {
   options.verification.similarity.min_inliers = settings.Get<int>("loop_closer.min_aligned");
   options.verification.min_seen = settings.Get<int>("loop_closer.min_seen");
   options.relocalization.min_seen = settings.Get<int>("loop_closer.min_relocalized");
-  options.verification.min_coverage = options.relocalization.min_coverage = settings.Get<double>("loop_closer.min_coverage");
+  options.verification.min_coverage = options.relocalization.min_coverage =
+      settings.Get<double>("loop_closer.min_coverage");
   if (const std::string problem = options.Check(); !problem.empty()) throw InputError("loop_closer: " + problem);
   return options;
 }

@@ -1,16 +1,16 @@
-// Wiring of the loop closer: changes of the map in, a loop result for each keyframe out; questions of a lost tracker in,
-// answers out.
+// Wiring of the loop closer: changes of the map in, a loop result for each keyframe out; questions of a lost tracker
+// in, answers out.
 #pragma once
 
 #include <deque>
 #include <memory>
 #include <optional>
 
-#include "geometry/camera_frame.h"
-#include "map/loop_types.h"
-#include "stages/loop_closer/loop_closer.h"
-#include "transport/map_subscription.h"
-#include "transport/stage.h"
+#include "loop_closing/loop_closer.h"
+#include "messages/end_of_stream.h"
+#include "messages/loop_types.h"
+#include "runtime/map_subscription.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 

@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "geometry/camera_frame.h"
 #include "map/map.h"
-#include "transport/map_subscription.h"
-#include "transport/stage.h"
+#include "messages/end_of_stream.h"
+#include "runtime/map_subscription.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 

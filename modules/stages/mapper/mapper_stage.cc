@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/errors.h"
-#include "transport/map_file.h"
+#include "wire/map_file.h"
 
 namespace tessera {
 namespace {
@@ -35,7 +35,8 @@ CorrectionDelays DelaysFrom(const Settings& settings) {
                                 settings.Get<int>("mapper.adjustment_delay_keyframes"),
                                 settings.Get<int>("mapper.adjustment_delay_growth")};
   if (delays.loop_keyframes < 1 || delays.loop_keyframes >= MapArchive::kSnapshotInterval) {
-    throw InputError("mapper.loop_delay_keyframes must be between 1 and " + std::to_string(MapArchive::kSnapshotInterval - 1));
+    throw InputError("mapper.loop_delay_keyframes must be between 1 and " +
+                     std::to_string(MapArchive::kSnapshotInterval - 1));
   }
   if (delays.adjustment_keyframes < 1 || delays.adjustment_growth < 1) {
     throw InputError("mapper.adjustment_delay_keyframes and mapper.adjustment_delay_growth must be at least 1");

@@ -6,12 +6,12 @@
 #include <optional>
 #include <string>
 
-#include "geometry/camera_frame.h"
 #include "map/map_archive.h"
 #include "map/removed_keyframes.h"
-#include "stages/mapper/correction_schedule.h"
-#include "stages/mapper/mapper.h"
-#include "transport/stage.h"
+#include "mapping/correction_schedule.h"
+#include "mapping/mapper.h"
+#include "messages/end_of_stream.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 
@@ -34,7 +34,7 @@ class MapperStage {
   CorrectionSchedule schedule_;
   KeyframeId next_keyframe_{0};  // the next to come
   std::deque<KeyframeObservation> waiting_;
-  int64_t num_processed_ = 0;    // keyframes
+  int64_t num_processed_ = 0;  // keyframes
   MapArchive archive_;
   KeyframePlaces places_;
   Publisher<MapDelta> deltas_;

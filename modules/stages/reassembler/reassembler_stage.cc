@@ -2,7 +2,7 @@
 
 #include "core/errors.h"
 #include "features/selection.h"
-#include "map/tracking_types.h"
+#include "messages/tracking_types.h"
 
 namespace tessera {
 namespace {
@@ -76,9 +76,8 @@ void ReassemblerStage::FinishIfDone() {
   if (context_.finished() || !dispatcher_end_ || assembler_.last_released().value + 1 < dispatcher_end_->num_frames) {
     return;
   }
-  end_of_stream_.Publish({.stage = "reassembler",
-                          .num_frames = dispatcher_end_->num_frames,
-                          .num_dropped = dispatcher_end_->num_dropped});
+  end_of_stream_.Publish(
+      {.stage = "reassembler", .num_frames = dispatcher_end_->num_frames, .num_dropped = dispatcher_end_->num_dropped});
   context_.Finish();
 }
 

@@ -3,9 +3,9 @@
 
 #include <optional>
 
-#include "geometry/camera_frame.h"
-#include "stages/reassembler/frame_assembler.h"
-#include "transport/stage.h"
+#include "distribution/frame_assembler.h"
+#include "messages/end_of_stream.h"
+#include "runtime/stage.h"
 
 namespace tessera {
 

@@ -1,5 +1,6 @@
 #include "stages/recorder/recorder_stage.h"
 
 int main(int argc, char** argv) {
-  return tessera::RunStage<tessera::RecorderStage>("recorder", "Writes everything that is said into an LCM log.", argc, argv);
+  return tessera::RunStage<tessera::RecorderStage>("recorder", "Writes everything that is said into an LCM log.", argc,
+                                                   argv);
 }

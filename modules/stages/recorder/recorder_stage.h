@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "transport/log_file.h"
-#include "transport/stage.h"
+#include "runtime/stage.h"
+#include "wire/log_file.h"
 
 namespace tessera {
 

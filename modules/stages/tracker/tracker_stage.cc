@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "core/errors.h"
-#include "transport/recorded_steps.h"
+#include "wire/recorded_steps.h"
 
 namespace tessera {
 namespace {
@@ -68,7 +68,8 @@ TrackerStage::TrackerStage(StageContext& context)
     if (asked_ && !IsAnswered()) requests_.Publish(*asked_);
   });
   context.Subscribe<FeatureFrame>(kFeaturesChannel, [this](const FeatureFrame& features, const MessageInfo&) {
-    if (features.frame <= last_received_) return;  // a reassembler that was started again repeats what isn't tracked yet
+    if (features.frame <= last_received_)
+      return;  // a reassembler that was started again repeats what isn't tracked yet
     last_received_ = features.frame;
     waiting_.push_back(features);
     TrackWaiting();
@@ -98,7 +99,8 @@ void TrackerStage::OnDeltas() {
 void TrackerStage::TrackWaiting() {
   while (!waiting_.empty()) {
     const FeatureFrame& features = waiting_.front();
-    const bool awaits_answer = waits_for_answers() && asked_ && asked_->features.frame == features.frame && !IsAnswered();
+    const bool awaits_answer =
+        waits_for_answers() && asked_ && asked_->features.frame == features.frame && !IsAnswered();
     if (awaits_loaded_map_ || awaits_answer || map_.needs_snapshot() || !schedule_.CanTrack(features.frame)) {
       if (!waits_since_us_) waits_since_us_ = context_.now_us();
       break;
@@ -142,8 +144,10 @@ bool TrackerStage::FitsMap(const CameraCalibration& camera) {
   tracker_.map().keyframes().ForEach(
       [&](KeyframeId, const Keyframe& keyframe) { fits &= keyframe.features->calibration == camera; });
   if (!fits) {
-    context_.Fail("the map that was loaded was made with another camera or sensor than this one: load a map of this "
-                  "camera, or begin without one", 2);
+    context_.Fail(
+        "the map that was loaded was made with another camera or sensor than this one: load a map of this "
+        "camera, or begin without one",
+        2);
   }
   return fits;
 }

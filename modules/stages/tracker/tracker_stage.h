@@ -1,16 +1,16 @@
-// Wiring of the tracker: features and changes of the map in, poses and keyframes out. Frames wait here until the changes
-// that they must see are there.
+// Wiring of the tracker: features and changes of the map in, poses and keyframes out. Frames wait here until the
+// changes that they must see are there.
 #pragma once
 
 #include <deque>
 #include <optional>
 
-#include "geometry/camera_frame.h"
+#include "messages/end_of_stream.h"
+#include "runtime/map_subscription.h"
+#include "runtime/stage.h"
 #include "tracking/delta_schedule.h"
 #include "tracking/map_tracker.h"
-#include "transport/map_subscription.h"
-#include "transport/recorded_steps.h"
-#include "transport/stage.h"
+#include "wire/recorded_steps.h"
 
 namespace tessera {
 
@@ -37,7 +37,7 @@ class TrackerStage {
   DeltaSchedule schedule_;
   const bool may_ask_;
   bool awaits_loaded_map_;
-  bool is_checked_ = false;       // the camera, against that of the map
+  bool is_checked_ = false;  // the camera, against that of the map
   MapSubscription map_;
   Publisher<PoseEstimate> poses_;
   Publisher<KeyframeObservation> keyframes_;

@@ -1,0 +1,62 @@
+#include "loop_closing/loop_closer.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "map/spanning_tree.h"
+
+namespace tessera {
+
+std::string LoopCloserOptions::Check() const {
+  for (const std::string& sentence :
+       {candidates.Check(), verification.Check(), correction.Check(), relocalization.Check()}) {
+    if (!sentence.empty()) return sentence;
+  }
+  return "";
+}
+
+LoopCloser::LoopCloser(std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options)
+    : options_(options), vocabulary_(std::move(vocabulary)) {
+  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+}
+
+std::string LoopCloser::ApplyDelta(const MapDelta& delta) {
+  if (delta.is_snapshot) places_ = PlaceDatabase();
+  if (std::string problem = map_.Apply(delta); !problem.empty()) return problem;
+  for (const KeyframeId id : delta.removed_keyframes) places_.Remove(id);
+  for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
+    if (map_.FindKeyframe(added.id) == nullptr) continue;
+    places_.Add(added.id, std::make_shared<const BagOfWords>(vocabulary_->Describe(added.features->descriptors)));
+  }
+  return "";
+}
+
+LoopResult LoopCloser::FindLoop(KeyframeId id) const {
+  LoopResult result;
+  result.answers = id;
+  if (map_.FindKeyframe(id) == nullptr) return result;
+  const Candidates candidates = FindLoopCandidates(map_, places_, id, options_.candidates);
+  result.num_candidates = candidates.num_found;
+  result.num_consistent = static_cast<int32_t>(candidates.keyframes.size());
+  for (const KeyframeId candidate : candidates.keyframes) {
+    VerificationSteps steps;
+    std::optional<VerifiedPlace> place = VerifyPlace(map_, places_, id, candidate, options_.verification, &steps);
+    result.num_matched += steps.is_matched ? 1 : 0;
+    result.num_aligned += steps.is_aligned ? 1 : 0;
+    if (!place) continue;
+    result.corrections = CorrectMap(map_, id, *place, options_.correction);
+    if (result.corrections.empty()) continue;
+    result.matched = place->matched;
+    result.matched_from_current = place->matched_from_current;
+    result.joins_parts = RootOf(map_, id) != RootOf(map_, place->matched);
+    result.seen = std::move(place->seen);
+    break;
+  }
+  return result;
+}
+
+RelocalizationAnswer LoopCloser::Relocalize(const RelocalizationRequest& request) const {
+  return tessera::Relocalize(map_, places_, *vocabulary_, request, options_.candidates, options_.relocalization);
+}
+
+}  // namespace tessera

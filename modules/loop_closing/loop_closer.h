@@ -1,0 +1,54 @@
+// The loop closer's steps: a keyframe in, whether it sees a place seen before; an image of a lost camera in, where it
+// was taken. No bus, no clock.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "loop_closing/loop_correction.h"
+#include "loop_closing/place_candidates.h"
+#include "loop_closing/place_verification.h"
+#include "loop_closing/relocalization.h"
+#include "map/map.h"
+#include "messages/loop_types.h"
+#include "place_recognition/place_database.h"
+#include "place_recognition/vocabulary.h"
+
+namespace tessera {
+
+struct LoopCloserOptions {
+  CandidateOptions candidates;
+  VerificationOptions verification;
+  CorrectionOptions correction;
+  RelocalizationOptions relocalization;
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+// Answers are pure functions of the map and the question: one that is started again, and gets the map as it was, gives
+// the same ones.
+class LoopCloser {
+ public:
+  // Throws std::invalid_argument with Check()'s sentence.
+  LoopCloser(std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
+
+  // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
+  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
+
+  // Whether keyframe `id` sees an earlier place, in the map as it is now. "No loop" if it is no longer there.
+  LoopResult FindLoop(KeyframeId id) const;
+  // Where the image was taken, in the map as it is now.
+  RelocalizationAnswer Relocalize(const RelocalizationRequest& request) const;
+
+  const Map& map() const { return map_; }
+
+ private:
+  const LoopCloserOptions options_;
+  std::shared_ptr<const Vocabulary> vocabulary_;
+  Map map_;
+  PlaceDatabase places_;  // of all keyframes of the map
+};
+
+}  // namespace tessera

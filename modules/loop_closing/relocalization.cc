@@ -1,0 +1,72 @@
+#include "loop_closing/relocalization.h"
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "loop_closing/place_verification.h"
+
+namespace tessera {
+namespace {
+
+size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
+
+// Where the camera stood, by the landmarks that keyframe `id` sees too.
+std::optional<Rigid3> RoughPose(const Keyframe& keyframe, const BagOfWords& keyframe_bag, const Map& map,
+                                const FrameView& view, const BagOfWords& bag, const RelocalizationOptions& options) {
+  const FeatureFrame& features = view.features();
+  const std::vector<KeypointPair> pairs = MatchByBags(
+      *keyframe.features, keyframe_bag, [&](int32_t i) { return keyframe.landmarks[Index(i)].valid(); }, features, bag,
+      [](int32_t) { return true; }, options.matching);
+  if (static_cast<int>(pairs.size()) < options.min_matches) return std::nullopt;
+  std::vector<PointPixel> points;
+  for (const KeypointPair& pair : pairs) {
+    const PixelObservation seen = view.observation(pair.second);
+    const Landmark& landmark = *map.FindLandmark(keyframe.landmarks[Index(pair.first)]);
+    points.push_back({landmark.position_in_world, seen.pixel_px, seen.sigma_px});
+  }
+  const auto seed = static_cast<uint64_t>(features.frame.value);
+  const std::optional<AbsolutePose> pose = EstimateAbsolutePose(features.calibration, points, seed, options.pose);
+  if (!pose) return std::nullopt;
+  return pose->camera_from_world.Inverse();
+}
+
+}  // namespace
+
+std::string RelocalizationOptions::Check() const {
+  if (min_matches < 4 || min_seen < 6 || num_neighbours < 1) {
+    return "a lost camera needs at least 4 matches and 6 landmarks seen to be found again";
+  }
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage of relocalisation must lie between 0 and 1";
+  return guided.Check();
+}
+
+RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, const Vocabulary& vocabulary,
+                                const RelocalizationRequest& request, const CandidateOptions& candidates,
+                                const RelocalizationOptions& options) {
+  RelocalizationAnswer answer;
+  answer.frame = request.features.frame;
+  const auto view = std::make_shared<const FrameView>(request.features, options.sigma_px, kRgbdBaseline);
+  const BagOfWords bag = vocabulary.Describe(view->features().descriptors);
+  const std::vector<KeyframeId> found = FindPlaces(map, places, bag, candidates);
+  answer.num_candidates = static_cast<int32_t>(found.size());
+  for (const KeyframeId id : found) {
+    const Keyframe& keyframe = *map.FindKeyframe(id);
+    const std::optional<Rigid3> pose = RoughPose(keyframe, *places.Find(id), map, *view, bag, options);
+    if (!pose) continue;
+    TrackedFrame frame(view);
+    frame.world_from_camera = *pose;
+    const PlacedPoints landmarks = LandmarksAround(map, id, options.num_neighbours);
+    if (PlaceAmong(landmarks, options.guided, {}, frame) < options.min_seen) continue;
+    if (Coverage(landmarks, frame) < options.min_coverage) continue;
+    answer.reference = id;
+    answer.reference_from_camera = (keyframe.WorldFromKeyframe().Inverse() * frame.world_from_camera).Pose();
+    for (size_t i = 0; i < frame.points.size(); ++i) {
+      if (frame.points[i].valid()) answer.seen.push_back({static_cast<int32_t>(i), frame.points[i].id.landmark});
+    }
+    break;
+  }
+  return answer;
+}
+
+}  // namespace tessera

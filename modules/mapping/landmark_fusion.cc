@@ -1,0 +1,100 @@
+#include "mapping/landmark_fusion.h"
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "map/neighbourhood.h"
+#include "measurement/feature_grid.h"
+#include "measurement/landmark_view.h"
+
+namespace tessera {
+namespace {
+
+// The keyframe's keypoint that shows the landmark best; -1: none does.
+int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const View& view, const Landmark& landmark,
+                     const FusionOptions& options) {
+  const std::optional<ExpectedView> expected = Expect(view, landmark);
+  if (!expected) return -1;
+  const double baseline_m = Baseline(view.calibration);
+  const Eigen::Vector3d point_in_camera = view.rotation * landmark.position_in_world + view.translation;
+  const double radius_px = options.radius_px * LevelScale(expected->level);
+  int32_t best = -1;
+  int best_distance = options.max_hamming + 1;
+  grid.VisitWindow(expected->pixel_px, radius_px, [&](int32_t i) {
+    const auto index = static_cast<size_t>(i);
+    const int level = keyframe.features->keypoints[index].level;
+    if (level < expected->level - 1 || level > expected->level) return;
+    const int distance = HammingDistance(landmark.descriptor, keyframe.features->descriptors[index]);
+    if (distance >= best_distance) return;
+    const PixelObservation seen = SeenAt(*keyframe.features, i);
+    const Eigen::Vector3d residual = ReprojectionResidual(view.calibration, baseline_m, point_in_camera, seen);
+    if (residual.squaredNorm() > Chi2Limit(seen.has_right())) return;
+    best = i;
+    best_distance = distance;
+  });
+  return best;
+}
+
+void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, const FusionOptions& options,
+                 MapEditor& editor) {
+  const Map& map = editor.map();
+  const Keyframe& keyframe = *map.FindKeyframe(target);
+  const FeatureGrid grid = MakeGrid(*keyframe.features);
+  const View view(keyframe.features->calibration, keyframe.world_from_camera);
+  for (const LandmarkId id : landmarks) {
+    const Landmark* landmark = map.FindLandmark(id);
+    if (landmark == nullptr || map.IsSeenBy(id, target)) continue;
+    const int32_t keypoint = BestKeypoint(keyframe, grid, view, *landmark, options);
+    if (keypoint < 0) continue;
+    const LandmarkId other = keyframe.landmarks[static_cast<size_t>(keypoint)];
+    if (!other.valid()) {
+      editor.AddObservation(id, {target, keypoint});
+      continue;
+    }
+    const size_t num_own = map.ObservationsOf(id).size(), num_other = map.ObservationsOf(other).size();
+    const bool keeps_own = num_own > num_other || (num_own == num_other && id < other);
+    editor.MergeLandmarks(keeps_own ? other : id, keeps_own ? id : other);
+  }
+}
+
+// In the order of its keypoints.
+std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe) {
+  std::vector<LandmarkId> landmarks;
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (id.valid()) landmarks.push_back(id);
+  }
+  return landmarks;
+}
+
+}  // namespace
+
+void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<LandmarkId>& landmarks,
+                      const FusionOptions& options, MapEditor& editor) {
+  for (const KeyframeId target : targets) ProjectInto(target, landmarks, options, editor);
+}
+
+std::string FusionOptions::Check() const {
+  if (max_neighbours < 1 || max_second_neighbours < 0) return "mapper.fusion_neighbours must be at least 1";
+  if (!(radius_px > 0.0) || max_hamming < 1) return "the mapper's search for duplicates needs a positive radius";
+  return "";
+}
+
+void FuseLandmarks(KeyframeId id, const FusionOptions& options, MapEditor& editor) {
+  const Map& map = editor.map();
+  std::set<KeyframeId> targets;
+  for (const KeyframeId neighbour : map.Covisible(id, options.max_neighbours)) {
+    targets.insert(neighbour);
+    for (const KeyframeId second : map.Covisible(neighbour, options.max_second_neighbours)) {
+      targets.insert(second);
+    }
+  }
+  targets.erase(id);
+
+  const std::vector<LandmarkId> own = SeenLandmarks(*map.FindKeyframe(id));
+  ProjectLandmarks(targets, own, options, editor);
+  const std::vector<KeyframeId> seers(targets.begin(), targets.end());
+  ProjectInto(id, LandmarksSeenBy(map, seers), options, editor);
+}
+
+}  // namespace tessera

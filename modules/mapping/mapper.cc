@@ -1,0 +1,192 @@
+#include "mapping/mapper.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <vector>
+
+#include "map/landmark_description.h"
+#include "map/map_editor.h"
+#include "measurement/landmark_view.h"
+#include "optimization/local_adjustment.h"
+
+namespace tessera {
+namespace {
+
+bool CanObserve(const Map& map, KeyframeId keyframe, int32_t keypoint, LandmarkId landmark) {
+  const Keyframe* seeing = map.FindKeyframe(keyframe);
+  if (seeing == nullptr || map.FindLandmark(landmark) == nullptr || keypoint < 0 ||
+      static_cast<size_t>(keypoint) >= seeing->landmarks.size() ||
+      seeing->landmarks[static_cast<size_t>(keypoint)].valid()) {
+    return false;
+  }
+  return !map.IsSeenBy(landmark, keyframe);
+}
+
+// The spanning tree's parent of a new keyframe: the one that shares most landmarks.
+void ChooseParent(KeyframeId id, MapEditor& editor) {
+  const std::vector<KeyframeId> best = editor.map().Covisible(id, 1);
+  if (!best.empty() && best.front() != editor.map().FindKeyframe(id)->parent) {
+    editor.SetParent(id, best.front());
+  }
+}
+
+// Whether the observations left still fix the landmark: two of them, or one with a depth.
+bool IsFixed(const Map& map, LandmarkId id) {
+  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  if (observations.size() != 1) return observations.size() > 1;
+  return SeenAt(*map.FindKeyframe(observations[0].keyframe)->features, observations[0].keypoint).has_right();
+}
+
+void RefreshDescriptions(MapEditor& editor) {
+  const std::vector<LandmarkId> touched(editor.touched_landmarks().begin(), editor.touched_landmarks().end());
+  for (const LandmarkId id : touched) {
+    if (!IsFixed(editor.map(), id)) {
+      editor.RemoveLandmark(id);
+    } else {
+      editor.ChangeLandmark(
+          id, editor.IsReobserved(id) ? DescribeLandmark(editor.map(), id) : DescribeMovedLandmark(editor.map(), id));
+    }
+  }
+}
+
+}  // namespace
+
+std::string MapperOptions::Check() const {
+  for (const std::string& sentence :
+       {creation.Check(), fusion.Check(), window.Check(), bundle.Check(), culling.Check()}) {
+    if (!sentence.empty()) return sentence;
+  }
+  return "";
+}
+
+Mapper::Mapper(const MapperOptions& options) : options_(options) {
+  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+}
+
+MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
+  MapEditor editor(map_);
+  Bend(due, seen.id, editor);
+  Insert(seen, editor);
+  ObserveLandmarks(seen, editor);
+  ObserveShared(seen, editor);
+  ChooseParent(seen.id, editor);
+  trial_.Judge(seen.id, options_.culling, editor);
+  const std::vector<LandmarkId> from_pairs = CreateLandmarks(seen.id, editor);
+  FuseLandmarks(seen.id, options_.fusion, editor);
+  RemoveUnconfirmed(seen.id, from_pairs, options_.culling, editor);
+  AdjustLocally(seen.id, options_.window, options_.bundle, editor);
+  CullKeyframes(seen.id, options_.culling, removed_, editor);
+  RefreshDescriptions(editor);
+  MapDelta delta = editor.Finish(seen.id);
+  delta.asks_adjustment = AskForAdjustment(seen.id);
+  return delta;
+}
+
+std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
+  MapEditor editor(map_);
+  const KeyframeId last = map_.answered();
+  const bool is_bent = Bend(due, {last.value + 1}, editor);
+  // What came into the map since the last adjustment began shall share in one, where loops hold the map together.
+  wants_adjustment_ |= last_asked_.valid() && last_asked_ < last;
+  if (!is_bent && !wants_adjustment_) return std::nullopt;
+  RefreshDescriptions(editor);
+  MapDelta delta = editor.Finish(last);
+  delta.asks_adjustment = AskForAdjustment(last);
+  return delta;
+}
+
+// Whether anything moved. A loop found on a map that was bent meanwhile is void, and so is an adjustment; a loop comes
+// first, since it changes more.
+bool Mapper::Bend(const DueCorrections& due, KeyframeId now, MapEditor& editor) {
+  bool is_bent = false;
+  for (const LoopResult& loop : due.loops) {
+    const bool is_there = map_.FindKeyframe(loop.answers) != nullptr && map_.FindKeyframe(loop.matched) != nullptr;
+    if (!is_there || loop.answers < last_bent_) {
+      ++num_void_loops_;
+      continue;
+    }
+    CloseLoop(loop, options_.loop_fusion, editor);
+    AdjustLocally(loop.answers, options_.window, options_.bundle, editor);
+    last_bent_ = now;
+    wants_adjustment_ = is_base_bent_ = is_bent = true;
+  }
+  if (due.adjustment) {
+    if (due.adjustment->is_usable && !is_base_bent_) {
+      ApplyAdjustment(*due.adjustment, *base_, editor);
+      last_bent_ = now;
+      is_bent = true;
+    }
+    base_.reset();
+  }
+  return is_bent;
+}
+
+bool Mapper::AskForAdjustment(KeyframeId now) {
+  if (!wants_adjustment_ || base_) return false;
+  base_ = TakeBase(map_);
+  last_asked_ = now;
+  wants_adjustment_ = is_base_bent_ = false;
+  return true;
+}
+
+// world_from_keyframe = world_from_reference (as the map has it now) * reference_from_camera
+void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
+  const size_t num_keypoints = seen.features.keypoints.size();
+  if (!seen.id.valid() || map_.FindKeyframe(seen.id) != nullptr || seen.landmarks.size() != num_keypoints ||
+      seen.features.descriptors.size() != num_keypoints) {
+    throw std::invalid_argument("keyframe " + std::to_string(seen.id.value) +
+                                " is not new, or its lists do not fit its keypoints");
+  }
+  const std::optional<Sim3> world_from_reference = removed_.Find(map_, seen.reference);
+  const Sim3 world_from_keyframe =
+      world_from_reference ? *world_from_reference * seen.reference_from_camera : Sim3::From(seen.world_from_camera);
+  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe,
+                     std::make_shared<const FeatureFrame>(seen.features));
+}
+
+void Mapper::ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor) {
+  for (size_t i = 0; i < seen.landmarks.size(); ++i) {
+    const auto keypoint = static_cast<int32_t>(i);
+    if (seen.landmarks[i].valid() && CanObserve(map_, seen.id, keypoint, seen.landmarks[i])) {
+      editor.AddObservation(seen.landmarks[i], {seen.id, keypoint});
+    }
+  }
+}
+
+// A keypoint of an earlier keyframe stands for its landmark; where it has none, the point becomes one.
+void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
+  std::vector<LandmarkId> created;
+  for (const SharedKeypoint& shared : seen.shared) {
+    const Keyframe* other = map_.FindKeyframe(shared.other);
+    if (other == nullptr || shared.other_keypoint < 0 ||
+        static_cast<size_t>(shared.other_keypoint) >= other->landmarks.size()) {
+      continue;
+    }
+    LandmarkId landmark = other->landmarks[static_cast<size_t>(shared.other_keypoint)];
+    if (!landmark.valid()) {
+      const Keyframe& own = *map_.FindKeyframe(seen.id);
+      if (shared.keypoint < 0 || static_cast<size_t>(shared.keypoint) >= own.landmarks.size() ||
+          own.landmarks[static_cast<size_t>(shared.keypoint)].valid()) {
+        continue;
+      }
+      landmark = editor.AddLandmark({.position_in_world = other->WorldFromKeyframe() * shared.position_in_other});
+      editor.AddObservation(landmark, {shared.other, shared.other_keypoint});
+      created.push_back(landmark);
+    }
+    if (CanObserve(map_, seen.id, shared.keypoint, landmark)) {
+      editor.AddObservation(landmark, {seen.id, shared.keypoint});
+    }
+  }
+  for (const LandmarkId landmark : created) {
+    editor.ChangeLandmark(landmark, DescribeLandmark(map_, landmark));
+  }
+}
+
+std::vector<LandmarkId> Mapper::CreateLandmarks(KeyframeId id, MapEditor& editor) {
+  std::vector<LandmarkId> from_pairs = CreateFromPairs(id, options_.creation, editor);
+  trial_.Add(id, from_pairs);
+  trial_.Add(id, CreateFromDepth(id, options_.creation, editor));
+  return from_pairs;
+}
+
+}  // namespace tessera

@@ -1,0 +1,88 @@
+#include "matching/matching.h"
+
+#include <algorithm>
+#include <array>
+
+namespace tessera {
+std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::Vector2d> centers_px,
+                                 const FrameView& second, double radius_px, const MatchingOptions& options) {
+  std::vector<Match> matches;
+  for (int i = 0; i < first.size(); ++i) {
+    const int level = first.keypoint(i).level;
+    BestMatch best;
+    second.grid().VisitWindow(centers_px[static_cast<size_t>(i)], radius_px, [&](int32_t j) {
+      if (std::abs(second.keypoint(j).level - level) <= 1) {
+        best.Offer(j, HammingDistance(first.descriptor(i), second.descriptor(j)));
+      }
+    });
+    if (best.IsClear(options)) {
+      matches.push_back({i, best.index, best.distance});
+    }
+  }
+  return DropUnlikeTurns(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
+}
+
+std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second) {
+  std::vector<int32_t> best(static_cast<size_t>(num_second), -1);  // by second: index into matches
+  for (size_t i = 0; i < matches.size(); ++i) {
+    int32_t& holder = best[static_cast<size_t>(matches[i].second)];
+    if (holder < 0 || matches[i].distance < matches[static_cast<size_t>(holder)].distance) {
+      holder = static_cast<int32_t>(i);
+    }
+  }
+  std::vector<Match> kept;
+  kept.reserve(matches.size());
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (best[static_cast<size_t>(matches[i].second)] == static_cast<int32_t>(i)) {
+      kept.push_back(matches[i]);
+    }
+  }
+  return kept;
+}
+
+std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& first, const FrameView& second,
+                                   const MatchingOptions& options) {
+  if (!options.check_rotation) {
+    return matches;
+  }
+  std::vector<uint8_t> turns;
+  turns.reserve(matches.size());
+  for (const Match& match : matches) {
+    turns.push_back(static_cast<uint8_t>(second.keypoint(match.second).angle - first.keypoint(match.first).angle));
+  }
+  const std::vector<char> agrees = AgreeingTurns(turns);
+  size_t kept = 0;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (agrees[i]) {
+      matches[kept++] = matches[i];
+    }
+  }
+  matches.resize(kept);
+  return matches;
+}
+
+std::vector<char> AgreeingTurns(std::span<const uint8_t> turns) {
+  constexpr int kSectors = 32, kSectorSize = 256 / kSectors;
+  std::array<int, kSectors> count{};
+  for (const uint8_t turn : turns) {
+    ++count[turn / kSectorSize];
+  }
+  // The fullest sector together with its two neighbours, since the peak may lie on a border.
+  int best = 0, best_count = -1;
+  for (int sector = 0; sector < kSectors; ++sector) {
+    const auto at = [&](int s) { return count[static_cast<size_t>((s + kSectors) % kSectors)]; };
+    const int sum = at(sector - 1) + at(sector) + at(sector + 1);
+    if (sum > best_count) {
+      best = sector;
+      best_count = sum;
+    }
+  }
+  std::vector<char> agrees(turns.size());
+  std::transform(turns.begin(), turns.end(), agrees.begin(), [best](uint8_t turn) {
+    const int distance = (turn / kSectorSize - best + kSectors) % kSectors;
+    return static_cast<char>(distance <= 1 || distance == kSectors - 1);
+  });
+  return agrees;
+}
+
+}  // namespace tessera

@@ -1,0 +1,133 @@
+#include "matching/point_matching.h"
+
+#include <algorithm>
+
+namespace tessera {
+namespace {
+
+size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
+
+// The best claim to each keypoint.
+class Claims {
+ public:
+  explicit Claims(size_t num_keypoints) : distances_(num_keypoints, 257) {}
+
+  // The lower distance wins; of equals the first.
+  void Claim(int32_t keypoint, int distance, SeenPoint point, std::vector<SeenPoint>& points) {
+    if (distance < distances_[Index(keypoint)]) {
+      distances_[Index(keypoint)] = distance;
+      points[Index(keypoint)] = std::move(point);
+    }
+  }
+
+ private:
+  std::vector<int> distances_;
+};
+
+// Whether the right column, where both have one, fits the expected one.
+bool IsRightNear(const PixelObservation& seen, const CameraCalibration& calibration, const ExpectedView& expected,
+                 double radius_px) {
+  if (!seen.has_right()) return true;
+  const double right_x_px = expected.pixel_px.x() - calibration.fx_px * Baseline(calibration) / expected.depth;
+  return std::abs(seen.right_x_px - right_x_px) <= radius_px;
+}
+
+}  // namespace
+
+std::string MatchOptions::Check() const {
+  if (!(last_radius_px > 0.0) || !(local_radius_px > 0.0)) return "the tracker's search radii must be positive";
+  if (max_hamming < 1 || max_hamming > 256) return "tracker.max_hamming must be between 1 and 256";
+  return "";
+}
+
+int TrackedFrame::NumPoints() const {
+  return static_cast<int>(std::count_if(points.begin(), points.end(), [](const SeenPoint& p) { return p.valid(); }));
+}
+
+int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& options, TrackedFrame& frame) {
+  frame.points.assign(frame.points.size(), {});
+  Claims claims(frame.points.size());
+  const View view(frame.view->calibration(), frame.world_from_camera);
+  const Rigid3 current_from_last = frame.world_from_camera.Inverse() * last.world_from_camera;
+  const uint8_t roll = RollBetween(current_from_last);
+  for (size_t i = 0; i < last.points.size(); ++i) {
+    if (!last.points[i].valid()) continue;
+    const Eigen::Vector3d point = view.rotation * last.points[i].landmark.position_in_world + view.translation;
+    if (point.z() <= 0.0) continue;
+    const Eigen::Vector2d pixel = view.calibration.Project(point);
+    const Keypoint& from = last.view->keypoint(static_cast<int>(i));
+    int best_distance = options.max_hamming + 1;
+    int32_t best = -1;
+    frame.view->grid().VisitWindow(pixel, radius_px * LevelScale(from.level), [&](int32_t candidate) {
+      const Keypoint& to = frame.view->keypoint(candidate);
+      if (std::abs(int{to.level} - int{from.level}) > 1 || !AreAnglesNear(from.angle, to.angle, roll)) return;
+      const int distance =
+          HammingDistance(last.view->descriptor(static_cast<int>(i)), frame.view->descriptor(candidate));
+      if (distance < best_distance) {
+        best_distance = distance;
+        best = candidate;
+      }
+    });
+    if (best >= 0) claims.Claim(best, best_distance, last.points[i], frame.points);
+  }
+  return frame.NumPoints();
+}
+
+int MatchLocal(const PlacedPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame) {
+  const std::vector<SeenPoint> before = frame.points;
+  Claims claims(frame.points.size());
+  const View view(frame.view->calibration(), frame.world_from_camera);
+  for (const auto& [id, landmark] : points) {
+    const std::optional<ExpectedView> expected = Expect(view, landmark);
+    if (!expected) continue;
+    // Seen as before, a point is found close to where it should be (ORB-SLAM: Mur-Artal et al. 2015).
+    const double radius = radius_px * (expected->cos_angle > 0.998 ? 0.625 : 1.0) * LevelScale(expected->level);
+    int best_distance = options.max_hamming + 1, second_distance = 257, best_level = -1, second_level = -1;
+    int32_t best = -1;
+    frame.view->grid().VisitWindow(expected->pixel_px, radius, [&](int32_t candidate) {
+      const int level = frame.view->keypoint(candidate).level;
+      if (before[Index(candidate)].valid() || level < expected->level - 1 || level > expected->level) return;
+      if (!IsRightNear(frame.view->observation(candidate), view.calibration, *expected, radius)) return;
+      const int distance = HammingDistance(landmark.descriptor, frame.view->descriptor(candidate));
+      if (distance < best_distance) {
+        second_distance = best_distance;
+        second_level = best_level;
+        best_distance = distance;
+        best_level = level;
+        best = candidate;
+      } else if (distance < second_distance) {
+        second_distance = distance;
+        second_level = level;
+      }
+    });
+    if (best < 0) continue;
+    if (best_level == second_level && best_distance > options.max_hamming_ratio * second_distance) continue;
+    claims.Claim(best, best_distance, {id, landmark}, frame.points);
+  }
+  return frame.NumPoints();
+}
+
+int MatchAnywhere(const PlacedPoints& points, const MatchOptions& options, TrackedFrame& frame) {
+  frame.points.assign(frame.points.size(), {});
+  Claims claims(frame.points.size());
+  for (const auto& [id, landmark] : points) {
+    int best_distance = options.max_hamming / 2 + 1, second_distance = 257;
+    size_t best = 0;
+    for (size_t i = 0; i < frame.points.size(); ++i) {
+      const int distance = HammingDistance(landmark.descriptor, frame.view->descriptor(static_cast<int>(i)));
+      if (distance < best_distance) {
+        second_distance = best_distance;
+        best_distance = distance;
+        best = i;
+      } else if (distance < second_distance) {
+        second_distance = distance;
+      }
+    }
+    if (best_distance <= options.max_hamming / 2 && best_distance <= options.max_hamming_ratio * second_distance) {
+      claims.Claim(static_cast<int32_t>(best), best_distance, {id, landmark}, frame.points);
+    }
+  }
+  return frame.NumPoints();
+}
+
+}  // namespace tessera

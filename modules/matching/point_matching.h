@@ -1,0 +1,57 @@
+// Which keypoint of a frame sees which known point.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "matching/point_id.h"
+#include "measurement/landmark_view.h"
+
+namespace tessera {
+
+struct MatchOptions {
+  double last_radius_px = 15.0;  // around the prediction from the last frame, at level 0; times the scale of the level
+  double local_radius_px = 3.0;  // around the projection with a pose that is nearly right; likewise
+  int max_hamming = 100;         // bits of 256: patches of one point under changed view, nearly always
+  double max_hamming_ratio = 0.8;  // best match to the second best
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+using PlacedPoints = std::vector<std::pair<PointId, Landmark>>;  // in world coordinates
+
+// A point that a frame sees.
+struct SeenPoint {
+  PointId id;
+  Landmark landmark;  // in world coordinates, as it was when it was matched
+
+  bool valid() const { return id.valid(); }
+};
+
+// A frame under way: its features, its place, and by keypoint the points that it sees.
+struct TrackedFrame {
+  explicit TrackedFrame(std::shared_ptr<const FrameView> frame_view)
+      : view(std::move(frame_view)), points(static_cast<size_t>(view->size())) {}
+
+  int NumPoints() const;
+
+  std::shared_ptr<const FrameView> view;
+  Rigid3 world_from_camera;
+  std::vector<SeenPoint> points;  // by keypoint
+};
+
+// Points that `last` sees, looked for around their projection into `frame` at its (predicted) pose: on a level next to
+// theirs, with their orientation. Sets frame.points; returns how many.
+int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& options, TrackedFrame& frame);
+
+// Known points that `frame` sees none of yet, looked for around their projection at its pose. Adds to frame.points;
+// returns how many.
+int MatchLocal(const PlacedPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame);
+
+// Known points, wherever they may stand, by descriptor alone. Sets frame.points; returns how many.
+int MatchAnywhere(const PlacedPoints& points, const MatchOptions& options, TrackedFrame& frame);
+
+}  // namespace tessera

@@ -1,0 +1,61 @@
+// What tracking tells the rest: the pose of each frame (POSE) and the frames worth keeping (KEYFRAME).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/ids.h"
+#include "features/feature_types.h"
+#include "geometry/rigid3.h"
+
+namespace tessera {
+
+enum class TrackingState {
+  kInitializing = 0,  // no map yet: the frame has no pose
+  kTracked = 1,       // the pose is estimated
+  kLost = 2,          // there was a map, but this frame could not be placed in it: no pose
+};
+
+// The pose of one frame as it was known at the time. Every frame that reaches the tracker gets one.
+struct PoseEstimate {
+  FrameId frame;
+  int64_t utime_us = 0;    // when the image was taken
+  int64_t arrival_us = 0;  // see FeatureFrame
+  TrackingState state = TrackingState::kInitializing;
+  Rigid3 world_from_camera;       // valid if tracked. Mono: units of the map
+  KeyframeId reference_keyframe;  // the keyframe that the pose is stored relative to
+  Rigid3 reference_from_camera;   // pose in its units: what is left true when it moves (Keyframe::scale)
+  int32_t num_features = 0;       // keypoints of the frame
+  int32_t num_matches = 0;        // matched to landmarks
+  int32_t num_inliers = 0;        // of those, consistent with the pose
+  int32_t num_landmarks = 0;      // landmarks in the map
+  bool is_keyframe = false;
+  bool is_relocalized = false;  // the first pose after a loss, in a part of the map that was there before
+  FrameId relocalized_by;       // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
+  int64_t num_deltas = 0;       // deltas that the map had seen by then: its step
+  bool is_live = false;         // the step is what happened to be there, not what logical time asks for
+  int64_t map_wait_us = 0;      // how long the frame had to wait for its step; for measuring only
+};
+
+// A keypoint that sees what a keypoint of an earlier keyframe saw, said before the tracker knows the landmark's id.
+struct SharedKeypoint {
+  int32_t keypoint = -1;        // of the new keyframe
+  KeyframeId other;             // an earlier keyframe
+  int32_t other_keypoint = -1;  // of `other`
+  // Where the tracker takes the point to be, in the camera frame and the units of `other` (Keyframe::scale).
+  Eigen::Vector3d position_in_other = Eigen::Vector3d::Zero();
+};
+
+// A frame that becomes part of the map. Its features never change; its pose does, later, in the mapper.
+struct KeyframeObservation {
+  KeyframeId id;
+  FeatureFrame features;
+  Rigid3 world_from_camera;            // the tracker's estimate
+  std::vector<LandmarkId> landmarks;   // by keypoint: the landmark it saw; invalid: none
+  KeyframeId reference;                // the keyframe that the estimate is relative to; invalid: a new part begins
+  Rigid3 reference_from_camera;        // as in PoseEstimate
+  std::vector<SharedKeypoint> shared;  // points without an id yet: mono's first ones, or from depth
+  int64_t num_deltas = 0;              // as in PoseEstimate
+};
+
+}  // namespace tessera

@@ -1,0 +1,73 @@
+#include "runtime/bus.h"
+
+#include <algorithm>
+
+#include "core/errors.h"
+#include "runtime/file_bus.h"
+#include "runtime/lcm_bus.h"
+#include "runtime/udp_check.h"
+
+namespace tessera {
+namespace {
+
+std::shared_ptr<Bus> OpenFile(const std::string& url) {
+  const std::string path = url.substr(std::string("file://").size());
+  const size_t options = path.find('?');
+  if (options == std::string::npos || path.substr(options) != "?mode=w") {
+    throw InputError(
+        "bus URL " + url +
+        " names a log to be read: write file://PATH?mode=w to record one, or camera.source=log:PATH to play one");
+  }
+  return std::make_shared<FileBus>(path.substr(0, options));
+}
+
+std::shared_ptr<Bus> OpenUdp(const std::string& url, int receive_buffer_bytes) {
+  const auto address = ParseUdpUrl(url);
+  if (!address) {
+    throw InputError("bus URL " + url +
+                     " has no multicast group and port: write it like udpm://239.255.76.67:7667?ttl=0");
+  }
+  if (const std::string problem = CheckUdp(*address); !problem.empty()) {
+    throw std::runtime_error(problem);
+  }
+  // No more than the kernel grants: LCM would print a paragraph about the rest for each bus.
+  const int granted = std::min(GrantedReceiveBuffer(receive_buffer_bytes), receive_buffer_bytes);
+  const std::string asked = "recv_buf_size=" + std::to_string(granted);
+  return std::make_shared<LcmBus>(url + (url.find('?') == std::string::npos ? "?" : "&") + asked,
+                                  static_cast<size_t>(std::max(granted / 2, 1)));
+}
+
+}  // namespace
+
+std::shared_ptr<Bus> OpenBus(const std::string& url, int receive_buffer_bytes) {
+  if (url.starts_with("file://")) return OpenFile(url);
+  if (url.starts_with("udpm://")) return OpenUdp(url, receive_buffer_bytes);
+  if (url == "memq://") return std::make_shared<LcmBus>(url, 0);
+  throw InputError("bus URL " + url + " is not known: write it like udpm://239.255.76.67:7667?ttl=0");
+}
+
+std::string UrlOf(const Channel& channel, const Settings& settings) {
+  switch (channel.bus) {
+    case BusKind::kMain:
+      return settings.Get<std::string>("bus.main_url");
+    case BusKind::kCamera:
+      return settings.Get<std::string>("bus.camera_url");
+    case BusKind::kWork:
+      return settings.Get<std::string>("bus.work_url");
+    case BusKind::kTile:
+      break;
+  }
+  std::string url = settings.Get<std::string>("bus.tile_url");
+  const int port = settings.Get<int>("bus.first_tile_port") + channel.extractor;
+  if (channel.extractor < 0 || channel.extractor >= kMaxExtractors || port < 1 || port > 65535) {
+    throw InputError("extractor " + std::to_string(channel.extractor) + " has no port: ids are 0 to " +
+                     std::to_string(kMaxExtractors - 1) + ", and bus.first_tile_port + id is at most 65535");
+  }
+  const std::string mark = "{port}";
+  if (const size_t at = url.find(mark); at != std::string::npos) {
+    url.replace(at, mark.size(), std::to_string(port));
+  }
+  return url;
+}
+
+}  // namespace tessera

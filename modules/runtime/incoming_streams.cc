@@ -1,0 +1,168 @@
+#include "runtime/incoming_streams.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace tessera {
+namespace {
+
+constexpr size_t kMaxRawChannels = 4096;  // that are put in order while recording
+
+bool IsOneOf(const WireType* type, std::initializer_list<const char*> names) {
+  return type != nullptr &&
+         std::any_of(names.begin(), names.end(), [&](const char* name) { return type->name() == name; });
+}
+
+}  // namespace
+
+IncomingStreams::IncomingStreams(const StreamSettings& settings, const Clock& clock,
+                                 std::function<void(const std::string&)> complain)
+    : settings_(settings), clock_(clock), complain_(std::move(complain)) {}
+
+IncomingStreams::~IncomingStreams() { Close(); }
+
+void IncomingStreams::Close() {
+  for (const auto& bus : buses_) bus->Unsubscribe(this);
+}
+
+void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_ptr<Bus> bus, Delivery delivery,
+                          ChannelReceiver::Sink sink) {
+  auto subscription = std::make_unique<Subscription>();
+  subscription->channel = channel.name;
+  subscription->type = &WireType::Named(type);
+  if (delivery == Delivery::kUnordered) {
+    subscription->sink = std::move(sink);
+  } else {
+    StreamReceiverOptions options = settings_.receiver;
+    options.starts_now = delivery == Delivery::kFromNow;
+    options.discards_at_restart = true;  // a frame behind one that lacks would be taken for the next
+    subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
+  }
+  bus->Subscribe(this, settings_.channel_prefix + channel.name,
+                 [this, heard = subscription.get()](const std::string&, ByteView message, int64_t arrival_us) {
+                   OnMessage(*heard, message, arrival_us);
+                 });
+  subscriptions_.push_back(std::move(subscription));
+  buses_.push_back(std::move(bus));
+}
+
+void IncomingStreams::OnMessage(const Subscription& subscription, ByteView message, int64_t arrival_us) {
+  const auto header = WireType::Of(message) == subscription.type ? ReadHeader(message) : std::nullopt;
+  if (!header) {
+    Refuse(subscription.channel,
+           "its " + std::to_string(message.size()) + " bytes are no " + subscription.type->name());
+  } else if (!subscription.receiver) {
+    subscription.sink.deliver(message, *header, arrival_us);
+  } else if (!subscription.receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
+    Refuse(subscription.channel, "its number " + std::to_string(header->sequence) + " can't be true");
+  }
+}
+
+void IncomingStreams::Refuse(const std::string& channel, const std::string& problem) {
+  ++num_undecodable_;
+  complain_("a message on " + channel + " is refused: " + problem);
+}
+
+void IncomingStreams::AddAll(const std::shared_ptr<Bus>& bus) {
+  if (std::find(raw_buses_.begin(), raw_buses_.end(), bus) != raw_buses_.end()) return;
+  bus->Subscribe(this, "", [this](const std::string& channel, ByteView message, int64_t arrival_us) {
+    OnRaw(channel, message, arrival_us);
+  });
+  raw_buses_.push_back(bus);
+  buses_.push_back(bus);
+}
+
+void IncomingStreams::OnRaw(const std::string& full_channel, ByteView message, int64_t arrival_us) {
+  const WireType* type = WireType::Of(message);
+  if (IsOneOf(type, {"heartbeat_t", "repair_request_t"})) {
+    return;
+  }
+  const auto header = full_channel.starts_with(settings_.channel_prefix) ? ReadHeader(message) : std::nullopt;
+  if (!header || IsOneOf(type, {"extractor_ready_t", "stage_status_t"})) {
+    raw_handler_(full_channel, message, arrival_us);
+    return;
+  }
+  ChannelReceiver* receiver = RawReceiver(full_channel.substr(settings_.channel_prefix.size()));
+  if (receiver == nullptr || !receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
+    raw_handler_(full_channel, message, arrival_us);
+  }
+}
+
+ChannelReceiver* IncomingStreams::RawReceiver(const std::string& channel) {
+  const auto it = raw_.find(channel);
+  if (it != raw_.end()) return it->second.get();
+  if (raw_.size() >= kMaxRawChannels) return nullptr;
+  const ChannelReceiver::Sink sink{
+      .deliver = [this, full_channel = settings_.channel_prefix + channel](
+                     ByteView message, const MessageHeader&,
+                     int64_t arrival_us) { raw_handler_(full_channel, message, arrival_us); },
+      .lose =
+          [this, channel](const std::string& publisher, int64_t num_messages) {
+            if (num_messages > 0) {
+              complain_("the recording lacks " + std::to_string(num_messages) + " messages of " + publisher + " on " +
+                        channel + ": nobody could send them again");
+            }
+          }};
+  return (raw_[channel] = std::make_unique<ChannelReceiver>(channel, settings_.receiver, sink)).get();
+}
+
+void IncomingStreams::AbandonRaw() {
+  for (const auto& [channel, receiver] : raw_) receiver->Abandon();
+}
+
+void IncomingStreams::OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat) {
+  const int64_t now_us = clock_.NowUs();
+  for (const StreamHead& head : heartbeat.streams) {
+    for (const auto& subscription : subscriptions_) {
+      if (subscription->receiver && subscription->channel == head.channel) {
+        subscription->receiver->OnHeartbeat(header.publisher, header.epoch_us, head, now_us);
+      }
+    }
+    if (!raw_handler_) continue;
+    if (ChannelReceiver* receiver = RawReceiver(head.channel)) {
+      receiver->OnHeartbeat(header.publisher, header.epoch_us, head, now_us);
+    }
+  }
+}
+
+std::vector<RepairRequest> IncomingStreams::Poll() {
+  const int64_t now_us = clock_.NowUs();
+  std::vector<RepairRequest> requests;
+  const auto poll = [&](ChannelReceiver& receiver) {
+    std::vector<RepairRequest> more = receiver.Poll(now_us);
+    std::move(more.begin(), more.end(), std::back_inserter(requests));
+  };
+  for (const auto& subscription : subscriptions_) {
+    if (subscription->receiver) poll(*subscription->receiver);
+  }
+  for (const auto& [channel, receiver] : raw_) poll(*receiver);
+  return requests;
+}
+
+std::optional<int64_t> IncomingStreams::next_poll_us() const {
+  std::optional<int64_t> next;
+  const auto look = [&](const ChannelReceiver& receiver) {
+    const auto poll_us = receiver.next_poll_us();
+    if (poll_us && (!next || *poll_us < *next)) next = poll_us;
+  };
+  for (const auto& subscription : subscriptions_) {
+    if (subscription->receiver) look(*subscription->receiver);
+  }
+  for (const auto& [channel, receiver] : raw_) look(*receiver);
+  return next;
+}
+
+StreamCounts IncomingStreams::counts() const {
+  StreamCounts counts;
+  const auto add = [&](const ChannelReceiver& receiver) {
+    counts.num_repaired += receiver.counts().num_repaired;
+    counts.num_lost += receiver.counts().num_lost;
+  };
+  for (const auto& subscription : subscriptions_) {
+    if (subscription->receiver) add(*subscription->receiver);
+  }
+  for (const auto& [channel, receiver] : raw_) add(*receiver);
+  return counts;
+}
+
+}  // namespace tessera

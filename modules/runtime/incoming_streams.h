@@ -1,0 +1,81 @@
+// What one process hears: its subscriptions, put in order and repaired.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/bus.h"
+#include "runtime/clock.h"
+#include "runtime/stream_settings.h"
+#include "streams/channel_receiver.h"
+#include "wire/wire_type.h"
+
+namespace tessera {
+
+class IncomingStreams {
+ public:
+  // `complain` gets one sentence for each message that makes no sense.
+  IncomingStreams(const StreamSettings& settings, const Clock& clock, std::function<void(const std::string&)> complain);
+  ~IncomingStreams();
+  IncomingStreams(const IncomingStreams&) = delete;
+  IncomingStreams& operator=(const IncomingStreams&) = delete;
+
+  // Gives messages of the channel, which must be of type `type` ("pose_t"), to `sink`, in the way that their delivery
+  // asks for. Throws std::runtime_error if the network refuses.
+  void Add(const Channel& channel, const char* type, std::shared_ptr<Bus> bus, Delivery delivery,
+           ChannelReceiver::Sink sink);
+
+  // Everything on a bus, for recording: streams in order and repaired from their first message on, what has no order as
+  // it comes, what is not this project's too. HEARTBEAT and REPAIR are left out: played again, they would speak of
+  // publishers that are gone.
+  using RawHandler = std::function<void(const std::string& channel, ByteView message, int64_t arrival_us)>;
+  void SetRawHandler(RawHandler handler) { raw_handler_ = std::move(handler); }
+  void AddAll(const std::shared_ptr<Bus>& bus);
+  bool hears_all() const { return raw_handler_ != nullptr; }
+
+  // The recording ends: gives on what waits behind gaps, and complains of the gaps.
+  void AbandonRaw();
+
+  // Hears nothing any more.
+  void Close();
+
+  void OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat);
+  // To be called when no message waits: what has to be asked for now.
+  std::vector<RepairRequest> Poll();
+  // When Poll has something to do, by the clock; nullopt: not before something comes.
+  std::optional<int64_t> next_poll_us() const;
+
+  StreamCounts counts() const;
+  int64_t num_undecodable() const { return num_undecodable_; }
+  // Counts and reports a message that was refused, after its header had been found good.
+  void Refuse(const std::string& channel, const std::string& problem);
+
+ private:
+  // One Add().
+  struct Subscription {
+    std::string channel;
+    const WireType* type = nullptr;
+    std::unique_ptr<ChannelReceiver> receiver;  // null: unordered
+    ChannelReceiver::Sink sink;
+  };
+  void OnMessage(const Subscription& subscription, ByteView message, int64_t arrival_us);
+  void OnRaw(const std::string& full_channel, ByteView message, int64_t arrival_us);
+  ChannelReceiver* RawReceiver(const std::string& channel);
+
+  const StreamSettings settings_;
+  const Clock& clock_;
+  std::function<void(const std::string&)> complain_;
+  std::vector<std::shared_ptr<Bus>> buses_;  // that are subscribed to
+  std::vector<std::unique_ptr<Subscription>> subscriptions_;
+  RawHandler raw_handler_;  // set while everything is recorded
+  std::vector<std::shared_ptr<Bus>> raw_buses_;
+  std::map<std::string, std::unique_ptr<ChannelReceiver>> raw_;  // by channel, without prefix
+  int64_t num_undecodable_ = 0;
+};
+
+}  // namespace tessera

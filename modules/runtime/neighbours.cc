@@ -1,0 +1,61 @@
+#include "runtime/neighbours.h"
+
+#include <tuple>
+
+namespace tessera {
+namespace {
+
+constexpr int64_t kMemoryUs = 1'000'000;
+constexpr size_t kMaxNeighbours = 1000;
+
+std::string Describe(const std::string& name, const std::string& host, int32_t pid) {
+  return name + " (process " + std::to_string(pid) + " on " + host + ")";
+}
+
+}  // namespace
+
+void Neighbours::OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat, int64_t now_us) {
+  if (header.epoch_us == own_.epoch_us && heartbeat.pid == own_.pid && heartbeat.host == own_.host) {
+    return;
+  }
+  std::erase_if(neighbours_, [&](const auto& entry) { return now_us - entry.second.heard_us > kMemoryUs; });
+  const auto [begin, end] = neighbours_.equal_range(header.epoch_us);
+  auto it = begin;
+  while (it != end && (it->second.name != header.publisher || it->second.pid != heartbeat.pid)) ++it;
+  if (it == end) {
+    if (neighbours_.size() >= kMaxNeighbours) return;
+    it = neighbours_.emplace(header.epoch_us, Neighbour{header.publisher, heartbeat.host, heartbeat.pid, 0, {}});
+  }
+  it->second.heard_us = now_us;
+  for (const StreamHead& stream : heartbeat.streams) {
+    if (stream.is_exclusive) it->second.exclusive_channels.insert(stream.channel);
+  }
+}
+
+bool Neighbours::IsAliveAndOlder(int64_t epoch_us, const Neighbour& neighbour, int64_t now_us) const {
+  return now_us - neighbour.heard_us <= kMemoryUs &&
+         std::tie(epoch_us, neighbour.host, neighbour.pid) < std::tie(own_.epoch_us, own_.host, own_.pid);
+}
+
+std::optional<std::string> Neighbours::ConflictOverName(int64_t now_us) const {
+  for (const auto& [epoch_us, neighbour] : neighbours_) {
+    if (neighbour.name == own_.name && IsAliveAndOlder(epoch_us, neighbour, now_us)) {
+      return "another process has this name already: " + Describe(neighbour.name, neighbour.host, neighbour.pid) +
+             "; end it, give this one another --name, or set other ports in bus.*_url";
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> Neighbours::ConflictOverChannel(const std::string& channel, int64_t now_us) const {
+  for (const auto& [epoch_us, neighbour] : neighbours_) {
+    if (neighbour.exclusive_channels.contains(channel) && IsAliveAndOlder(epoch_us, neighbour, now_us)) {
+      return "channel " + channel +
+             " already has a publisher: " + Describe(neighbour.name, neighbour.host, neighbour.pid) +
+             "; end it, or set other ports in bus.*_url for this one";
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace tessera

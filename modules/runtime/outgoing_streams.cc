@@ -1,0 +1,94 @@
+#include "runtime/outgoing_streams.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace tessera {
+namespace {
+
+constexpr size_t kStreamsPerHeartbeat = 16;  // fits 1400 bytes
+constexpr int kMaxResent = 1024;             // messages sent again on one request
+constexpr size_t kLcmHeaderBytes = 8;
+
+}  // namespace
+
+OutgoingStreams::OutgoingStreams(const StageIdentity& identity, const StreamSettings& settings)
+    : identity_(identity), settings_(settings) {}
+
+int OutgoingStreams::Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired, bool is_exclusive) {
+  streams_.push_back({.channel = channel,
+                      .full_name = settings_.channel_prefix + channel.name,
+                      .bus = std::move(bus),
+                      .is_repaired = is_repaired,
+                      .is_exclusive = is_exclusive,
+                      .history = StreamHistory(settings_.history_bytes)});
+  return static_cast<int>(streams_.size()) - 1;
+}
+
+MessageHeader OutgoingStreams::NextHeader(int stream, int64_t wall_us) const {
+  return {.publisher = identity_.name,
+          .epoch_us = identity_.epoch_us,
+          .sequence = streams_[static_cast<size_t>(stream)].num_sent,
+          .publish_us = wall_us};
+}
+
+size_t OutgoingStreams::MaxMessageBytes(int stream) const {
+  return settings_.max_message_bytes - kLcmHeaderBytes - streams_[static_cast<size_t>(stream)].full_name.size() - 1;
+}
+
+bool OutgoingStreams::Send(int stream_number, std::vector<Bytes> messages, std::optional<int64_t> source_us) {
+  Stream& stream = streams_[static_cast<size_t>(stream_number)];
+  const bool is_kept = stream.is_repaired && stream.bus->can_listen();
+  bool all_sent = true;
+  for (Bytes& message : messages) {
+    ++stream.num_sent;
+    const Bytes& kept = is_kept ? stream.history.Append(std::move(message)) : message;
+    all_sent = stream.bus->Publish(stream.full_name, kept, source_us) && all_sent;
+  }
+  return all_sent;
+}
+
+void OutgoingStreams::Resend(const RepairRequest& request, int64_t now_us) {
+  if (request.publisher != identity_.name || request.epoch_us != identity_.epoch_us) {
+    return;
+  }
+  const auto stream = std::find_if(streams_.begin(), streams_.end(),
+                                   [&](const Stream& candidate) { return candidate.channel.name == request.channel; });
+  if (stream == streams_.end()) {
+    return;
+  }
+  int num_resent = 0;
+  for (const SequenceRange& range : request.ranges) {
+    const int64_t end = std::min(range.last + 1, stream->history.next());
+    for (int64_t i = std::max(range.first, stream->history.first()); i < end && num_resent < kMaxResent; ++i) {
+      if (const Bytes* message = stream->history.Resend(i, now_us, settings_.receiver.repair_us / 2)) {
+        stream->bus->Publish(stream->full_name, *message, std::nullopt);
+        ++num_resent;
+      }
+    }
+  }
+}
+
+std::vector<Heartbeat> OutgoingStreams::MakeHeartbeats() const {
+  std::vector<Heartbeat> heartbeats(1);
+  for (const Stream& stream : streams_) {
+    if (!stream.is_repaired) continue;
+    if (heartbeats.back().streams.size() == kStreamsPerHeartbeat) heartbeats.emplace_back();
+    heartbeats.back().streams.push_back({.channel = stream.channel.name,
+                                         .first_sequence = stream.history.first(),
+                                         .next_sequence = stream.history.next(),
+                                         .is_exclusive = stream.is_exclusive});
+  }
+  for (Heartbeat& heartbeat : heartbeats) {
+    heartbeat.host = identity_.host;
+    heartbeat.pid = identity_.pid;
+  }
+  return heartbeats;
+}
+
+bool OutgoingStreams::IsExclusive(const std::string& channel) const {
+  return std::any_of(streams_.begin(), streams_.end(),
+                     [&](const Stream& stream) { return stream.is_exclusive && stream.channel.name == channel; });
+}
+
+}  // namespace tessera

@@ -1,0 +1,66 @@
+// What one process sends: its numbered streams, the history they are repaired from, and how far they have come.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/bus.h"
+#include "runtime/stream_settings.h"
+#include "streams/stream_history.h"
+#include "wire/codec.h"
+
+namespace tessera {
+
+struct StageIdentity {
+  std::string name;      // "extractor_2"
+  int id = 0;            // the 2 in it
+  int64_t epoch_us = 0;  // when it started, wall clock
+  std::string host;
+  int32_t pid = 0;
+};
+
+class OutgoingStreams {
+ public:
+  OutgoingStreams(const StageIdentity& identity, const StreamSettings& settings);
+
+  // A new stream; returns its number here. `is_repaired`: its messages are kept and announced.
+  int Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired, bool is_exclusive);
+
+  // The header of the next value in the stream.
+  MessageHeader NextHeader(int stream, int64_t wall_us) const;
+  // The largest message that may be encoded for it.
+  size_t MaxMessageBytes(int stream) const;
+  // Sends the messages of one value. False if the operating system refused one (it will be asked for again).
+  bool Send(int stream, std::vector<Bytes> messages, std::optional<int64_t> source_us);
+
+  // What was sent so far is not kept any longer.
+  void Forget(int stream) { streams_[static_cast<size_t>(stream)].history.Clear(); }
+
+  // Sends again what is asked for and still there.
+  void Resend(const RepairRequest& request, int64_t now_us);
+
+  // How far the repaired streams have come, in lots that each fit one message.
+  std::vector<Heartbeat> MakeHeartbeats() const;
+  const std::string& channel(int stream) const { return streams_[static_cast<size_t>(stream)].channel.name; }
+  // Whether channel `channel` is sent here, and nobody else may send on it.
+  bool IsExclusive(const std::string& channel) const;
+
+ private:
+  struct Stream {
+    Channel channel;
+    std::string full_name;  // with prefix
+    std::shared_ptr<Bus> bus;
+    bool is_repaired = true;
+    bool is_exclusive = false;
+    StreamHistory history;
+    int64_t num_sent = 0;
+  };
+  const StageIdentity identity_;
+  const StreamSettings settings_;
+  std::vector<Stream> streams_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,207 @@
+// The main of every stage process.
+#include <poll.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <climits>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "core/errors.h"
+#include "runtime/stage.h"
+#include "runtime/stage_engine.h"
+#include "runtime/udp_check.h"
+
+namespace tessera {
+namespace {
+
+std::atomic<bool> told_to_stop{false};
+
+void OnSignal(int /*signal*/) { told_to_stop = true; }
+
+struct Arguments {
+  std::string settings_path;
+  std::vector<std::string> assignments;
+  std::string name;
+  int id = 0;
+};
+
+// The arguments; an exit status if the process is to end at once.
+std::optional<int> ParseArguments(const std::string& description, int argc, char** argv, Arguments* arguments) {
+  CLI::App app(description);
+  app.add_option("--settings", arguments->settings_path,
+                 "YAML file with the settings that differ from config/default.yaml");
+  app.add_option("--set", arguments->assignments, "one setting, section.key=value; may be repeated");
+  app.add_option("--name", arguments->name, "name of this process on the bus");
+  app.add_option("--id", arguments->id, "number of this extractor: it gets its jobs on TILE_<id>")
+      ->check(CLI::Range(0, kMaxExtractors - 1));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return std::nullopt;
+}
+
+// On a node without the sources the file given must hold all settings.
+Settings ReadSettings(const Arguments& arguments) {
+  const std::string defaults = TESSERA_SOURCE_DIR "/config/default.yaml";
+  const bool has_file = !arguments.settings_path.empty();
+  const bool has_defaults = std::filesystem::exists(defaults);
+  Settings settings = Settings::LoadDefaults(has_defaults || !has_file ? defaults : arguments.settings_path);
+  if (has_file && has_defaults) settings.OverrideFromFile(arguments.settings_path);
+  for (const std::string& assignment : arguments.assignments) {
+    settings.Override(assignment);
+  }
+  return settings;
+}
+
+void CheckCpu() {
+#if defined(__x86_64__)
+  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi2") || !__builtin_cpu_supports("fma")) {
+    throw InputError(
+        "this CPU lacks AVX2 (x86-64-v3), for which Tessera is compiled; use a machine from 2015 or later");
+  }
+#endif
+}
+
+void CheckReceiveBuffer(const Settings& settings) {
+  const int asked = settings.Get<int>("bus.receive_buffer_bytes");
+  const int granted = GrantedReceiveBuffer(asked);
+  if (settings.Get<std::string>("bus.main_url").starts_with("udpm:") && granted < asked) {
+    spdlog::warn(
+        "the kernel grants a receive buffer of {} bytes where {} are asked for; bursts will have to be sent "
+        "again. Raise it: sudo sysctl -w net.core.rmem_max={}",
+        granted, asked, asked);
+  }
+}
+
+std::string HostName() {
+  char name[HOST_NAME_MAX + 1] = {};
+  gethostname(name, sizeof(name) - 1);
+  return name;
+}
+
+StageContext::Impl::Setup MakeSetup(const Arguments& arguments) {
+  StageContext::Impl::Setup setup;
+  setup.settings = ReadSettings(arguments);
+  setup.clock = std::make_shared<ComputerClock>();
+  setup.identity = {.name = arguments.name,
+                    .id = arguments.id,
+                    .epoch_us = setup.clock->WallUs(),
+                    .host = HostName(),
+                    .pid = static_cast<int32_t>(getpid())};
+  const int buffer_bytes = setup.settings.Get<int>("bus.receive_buffer_bytes");
+  setup.open_bus = [buffer_bytes](const std::string& url) { return OpenBus(url, buffer_bytes); };
+  setup.log = [](bool is_error, const std::string& sentence) {
+    spdlog::log(is_error ? spdlog::level::err : spdlog::level::info, "{}", sentence);
+  };
+  return setup;
+}
+
+// Sleeps until a message waits or something is due, and at most a tenth of a second: signals are looked at then.
+void Wait(const StageContext::Impl& engine) {
+  std::vector<pollfd> descriptors;
+  for (const auto& bus : engine.buses()) {
+    if (bus->file_descriptor() >= 0) descriptors.push_back({bus->file_descriptor(), POLLIN, 0});
+  }
+  const int64_t wait_us = std::clamp<int64_t>(engine.NextDueUs() - engine.clock_->NowUs(), 0, 100'000);
+  const timespec timeout{.tv_sec = 0, .tv_nsec = wait_us * 1000};
+  ppoll(descriptors.data(), descriptors.size(), &timeout, nullptr);
+}
+
+void RunFor(StageContext::Impl& engine, int64_t duration_us) {
+  const int64_t end_us = engine.clock_->NowUs() + duration_us;
+  while (engine.clock_->NowUs() < end_us && !engine.stopped_) {
+    if (!engine.Step()) Wait(engine);
+  }
+}
+
+bool CanListenAnywhere(const StageContext::Impl& engine) {
+  const auto buses = engine.buses();
+  return std::any_of(buses.begin(), buses.end(), [](const auto& bus) { return bus->can_listen(); });
+}
+
+void RunUntilStopped(StageContext& context) {
+  StageContext::Impl& engine = context.impl();
+  while (!told_to_stop && !engine.stopped_) {
+    if (!engine.Step()) Wait(engine);
+    if (context.finished() && !CanListenAnywhere(engine)) break;  // writing a log: nobody will ask for anything
+  }
+}
+
+// A recorder that is told to stop first gets what is on its way, and asks for what lacks, as long as there is hope.
+void CompleteRecording(StageContext::Impl& engine) {
+  constexpr int64_t kLongestUs = 2'000'000;
+  RunFor(engine, 2 * engine.stream_settings_.heartbeat_us);  // a tail that got lost is known then
+  const int64_t end_us = engine.clock_->NowUs() + kLongestUs;
+  while (engine.incoming_.next_poll_us() && engine.clock_->NowUs() < end_us && !engine.stopped_) {
+    if (!engine.Step()) Wait(engine);
+  }
+  engine.incoming_.AbandonRaw();
+}
+
+// The whole life of the stage. Returns the exit status, after a sentence if the stage failed.
+int Live(const std::string& program, const Arguments& arguments,
+         const std::function<std::shared_ptr<void>(StageContext&)>& make_stage) {
+  CheckCpu();
+  StageContext::Impl::Setup setup = MakeSetup(arguments);
+  CheckReceiveBuffer(setup.settings);
+  StageContext context(std::make_unique<StageContext::Impl>(std::move(setup)));
+  StageContext::Impl& engine = context.impl();
+  const int64_t two_heartbeats_us = 2 * engine.stream_settings_.heartbeat_us;
+  if (CanListenAnywhere(engine)) RunFor(engine, two_heartbeats_us);  // who else is here?
+  std::shared_ptr<void> stage;
+  if (!engine.stopped_) {
+    stage = make_stage(context);
+    engine.BeginToRun();  // who waits for it to run need not wait for the next regular one
+    RunUntilStopped(context);
+    if (engine.incoming_.hears_all()) CompleteRecording(engine);
+  }
+  const int64_t num_published = engine.figures_.num_published;
+  engine.ForgetStage();
+  stage.reset();
+  if (engine.figures_.num_published > num_published && CanListenAnywhere(engine)) {
+    RunFor(engine, two_heartbeats_us);  // last words may have to be repeated
+  }
+  engine.SendStatus(true);
+  if (engine.exit_status_ != 0) {
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), engine.failure_.c_str());
+    return engine.exit_status_;
+  }
+  for (const auto& bus : engine.buses()) bus->Close();
+  return 0;
+}
+
+}  // namespace
+
+int RunStageMain(const std::string& stage, const std::string& description, int argc, char** argv,
+                 const std::function<std::shared_ptr<void>(StageContext&)>& make_stage) {
+  Arguments arguments{.name = stage};
+  if (const auto exit_status = ParseArguments(description, argc, argv, &arguments)) {
+    return *exit_status;
+  }
+  spdlog::set_default_logger(spdlog::stderr_logger_st(arguments.name));
+  spdlog::set_pattern("%H:%M:%S.%e %n %l: %v");
+  std::signal(SIGTERM, OnSignal);
+  std::signal(SIGINT, OnSignal);
+  std::signal(SIGPIPE, SIG_IGN);
+  const std::string program = "tessera-" + stage;
+  try {
+    return Live(program, arguments, make_stage);
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", program.c_str(), error.what());
+    return 1;
+  }
+}
+
+}  // namespace tessera

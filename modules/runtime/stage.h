@@ -1,0 +1,149 @@
+// What a stage's wiring sees of the world: settings, typed channels, timers, and its own status.
+//
+//   class TrackerStage {
+//    public:
+//     explicit TrackerStage(StageContext& context);   // subscribes and advertises; state lives in members
+//   };
+//   int main(int argc, char** argv) { return tessera::RunStage<tessera::TrackerStage>("tracker", "Estimates ...", argc,
+//   argv); }
+//
+// Handlers and timers all run on one thread, one after the other. A handler may throw: the error is counted, logged
+// and published in STATUS, and the stage goes on; an InputError thrown by the constructor ends the process with
+// status 2, any other exception with 1.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "messages/channels.h"
+#include "messages/stage_messages.h"
+#include "settings/settings.h"
+#include "wire/bytes.h"
+
+namespace tessera {
+
+struct MessageInfo {
+  std::string publisher;   // stage name
+  int64_t epoch_us = 0;    // start time of the publisher
+  int64_t sequence = 0;    // of the value's last part in its stream
+  int64_t publish_us = 0;  // publisher's wall clock when it sent it; for measuring only
+  int64_t arrival_us = 0;  // wall clock at which the first part arrived here; for measuring only
+};
+
+class StageContext;
+
+// Sends values of one type on one channel. Cheap to copy; valid as long as the context.
+template <class Value>
+class Publisher {
+ public:
+  Publisher() = default;
+  void Publish(const Value& value) const;
+  // What was published so far interests nobody any more: it is not kept for repair.
+  void Forget() const;
+
+ private:
+  friend class StageContext;
+  StageContext* context_ = nullptr;
+  int stream_ = -1;
+};
+
+// Whether a channel may have several publishers at once (STATUS), or a second one is an error (POSE).
+enum class Publishers { kOne, kMany };
+
+class StageContext {
+ public:
+  struct Impl;
+  explicit StageContext(std::unique_ptr<Impl> impl);
+  ~StageContext();
+  StageContext(const StageContext&) = delete;
+  StageContext& operator=(const StageContext&) = delete;
+
+  const Settings& settings() const;
+  const std::string& name() const;  // "extractor_2"
+  int id() const;                   // the 2 in it; 0 for a stage that exists once
+  int64_t epoch_us() const;         // when it started, wall clock
+  // A clock that never jumps, for time-outs and rates only. Tests on a MemoryBus let it run as fast as they like, so
+  // a stage asks this one and no other.
+  int64_t now_us() const;
+
+  // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
+  template <class Value>
+  Publisher<Value> Advertise(const Channel& channel, Publishers publishers = Publishers::kOne);
+
+  // `handler` gets every value of every publisher of the channel, per publisher in order and once. What was lost on
+  // the way is asked for again; what does not come is counted in STATUS, and the stream goes on behind it.
+  template <class Value>
+  void Subscribe(const Channel& channel, std::function<void(const Value&, const MessageInfo&)> handler);
+
+  // For recording: `handler` gets every message of every bus, also of each extractor's, as it was sent (`channel` with
+  // prefix); streams from their first message on, in order and repaired. HEARTBEAT and REPAIR are left out: played
+  // again, they would speak of publishers that are gone.
+  using RawHandler = std::function<void(const std::string& channel, ByteView message, int64_t arrival_us)>;
+  void SubscribeAll(RawHandler handler);
+
+  // Calls `task` about every `period`. For liveness and output only; no result may depend on it.
+  void Every(std::chrono::milliseconds period, std::function<void()> task);
+  // Runs `task` whenever no message waits: again at once while it returns true, else after the next message or timer.
+  // The main loop of a stage that makes its own work, such as the camera.
+  void WhenIdle(std::function<bool()> task);
+
+  // This process under another robot's channel prefix: channels, streams, STATUS, HEARTBEAT and REPAIR of its own, on
+  // the same buses, thread and clock. It lives as long as this context. If another process of this name is there
+  // already, it falls silent, which is an error here, and this context goes on: so it had better listen for two
+  // heartbeats before it advertises. Throws InputError if the prefix can't be one.
+  StageContext& JoinRobot(const std::string& channel_prefix);
+  bool fell_silent() const;
+
+  // The stage has sent its last value. It stays to repair what others missed until it is told to stop (SIGTERM,
+  // SIGINT, end of a memq test), and says `kFinished` in its status.
+  void Finish();
+  bool finished() const;
+
+  // Ends the process's loop with this exit status after one sentence. Nothing but a last status is sent any more.
+  void Fail(const std::string& sentence, int exit_status = 1);
+
+  // Own figures for STATUS.
+  void RecordStep(double milliseconds);
+  void SetQueue(int64_t num_waiting);
+  void AddDropped(int64_t num_frames);
+  void SetValue(const std::string& name, double value);
+  void ReportError(const std::string& sentence);
+  void Info(const std::string& sentence);
+
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+// Measures a step from construction to destruction and records it.
+class StepTimer {
+ public:
+  explicit StepTimer(StageContext& context) : context_(context), begin_(std::chrono::steady_clock::now()) {}
+  ~StepTimer() {
+    context_.RecordStep(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count());
+  }
+  StepTimer(const StepTimer&) = delete;
+  StepTimer& operator=(const StepTimer&) = delete;
+
+ private:
+  StageContext& context_;
+  std::chrono::steady_clock::time_point begin_;
+};
+
+// The main of every stage: arguments (--settings FILE, --set section.key=value, --name NAME, --id N, --help), checks of
+// the machine and the network with clear sentences, signals, the loop, the orderly end. Returns the exit status.
+int RunStageMain(const std::string& stage, const std::string& description, int argc, char** argv,
+                 const std::function<std::shared_ptr<void>(StageContext&)>& make_stage);
+
+template <class Stage>
+int RunStage(const std::string& stage, const std::string& description, int argc, char** argv) {
+  return RunStageMain(stage, description, argc, argv,
+                      [](StageContext& context) { return std::make_shared<Stage>(context); });
+}
+
+}  // namespace tessera

@@ -1,0 +1,118 @@
+// What stands behind a StageContext: buses, streams, timers and the stage's figures. RunStageMain drives it by the
+// computer's clock and poll(); MemoryBus by a clock of its own.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "runtime/bus.h"
+#include "runtime/clock.h"
+#include "runtime/incoming_streams.h"
+#include "runtime/neighbours.h"
+#include "runtime/outgoing_streams.h"
+#include "runtime/stage.h"
+#include "runtime/stage_figures.h"
+#include "runtime/stream_settings.h"
+#include "settings/settings.h"
+
+namespace tessera {
+
+struct StageContext::Impl {
+  struct Setup {
+    Settings settings;
+    StageIdentity identity;
+    std::shared_ptr<const Clock> clock;
+    std::function<std::shared_ptr<Bus>(const std::string& url)> open_bus;
+    std::function<void(bool is_error, const std::string& sentence)> log;
+  };
+  // Opens the main bus and listens there for who else is on it. Throws as OpenBus does.
+  explicit Impl(Setup setup);
+
+  // --- for StageContext ---
+  std::shared_ptr<Bus> BusOf(const Channel& channel);
+  // Throws std::runtime_error if the channel already has another publisher.
+  int Advertise(const Channel& channel, Delivery delivery, bool is_exclusive);
+  template <class Value>
+  void Send(int stream, const Value& value);
+  template <class Value>
+  void Subscribe(const Channel& channel,
+                 std::function<void(const Value&, const MessageHeader&, int64_t arrival_us)> handler);
+  void SubscribeAll(const IncomingStreams::RawHandler& handler);
+  StageContext& Join(const std::string& channel_prefix);
+  void ReportError(const std::string& sentence);
+  void Fail(const std::string& sentence, int exit_status);
+  // Runs `call`; reports what it throws.
+  void CallSafely(const std::string& where, const std::function<void()>& call);
+
+  // --- for who drives it ---
+  // One round: handles messages that wait, runs what is due; when nothing waits any more, asks for what lacks and runs
+  // idle tasks. False if there is nothing left to do before something arrives or NextDueUs().
+  bool Step();
+  int64_t NextDueUs() const;
+  // The stage stands: says so.
+  void BeginToRun();
+  // Values sent and received, but for what stages say of themselves; under all prefixes.
+  int64_t num_values() const;
+  std::vector<std::shared_ptr<Bus>> buses() const;
+  void SendHeartbeats();
+  void SendStatus(bool is_final);
+  // Ends silently: neither hears nor says anything any more.
+  void Silence();
+  // The stage is about to be destroyed: none of its tasks and handlers is called again.
+  void ForgetStage();
+
+  struct Timer {
+    int64_t period_us = 0;
+    int64_t due_us = 0;
+    std::function<void()> task;
+  };
+
+  const Settings settings_;
+  const StageIdentity identity_;
+  const StreamSettings stream_settings_;
+  const std::shared_ptr<const Clock> clock_;
+  std::function<std::shared_ptr<Bus>(const std::string& url)> open_bus_;
+  std::function<void(bool is_error, const std::string& sentence)> log_;
+  std::map<std::string, std::shared_ptr<Bus>> buses_;  // by URL
+  StageFigures figures_;
+  Neighbours neighbours_;
+  OutgoingStreams outgoing_;
+  IncomingStreams incoming_;
+  std::vector<Timer> timers_;
+  std::vector<std::function<bool()>> idle_tasks_;
+  StageState state_ = StageState::kStarting;
+  bool stopped_ = false;
+  bool stage_is_gone_ = false;
+  int exit_status_ = 0;
+  std::string failure_;
+
+ private:
+  std::shared_ptr<Bus> BusAt(const std::string& url);
+  void OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header);
+  void ListenToExtractors(const Heartbeat& heartbeat);
+  bool HandleMessages();
+  void RunTimers();
+  void AskForRepairs();
+  bool RunIdleTasks();
+  void PartFromFailed();
+
+  bool talks_ = false;  // the main bus has listeners
+  int heartbeat_stream_ = -1;
+  int repair_stream_ = -1;
+  int status_stream_ = -1;
+  bool hears_repairs_ = false;
+  int64_t heartbeat_due_us_ = 0;     // the next regular one
+  int64_t soon_due_us_ = INT64_MAX;  // the one soon after a value was sent
+  int64_t status_due_us_ = 0;
+  int64_t num_errors_ = 0;  // reported within the second that began at
+  int64_t errors_since_us_ = 0;
+  bool is_silent_ = false;
+  std::vector<std::unique_ptr<StageContext>> others_;  // this process under other prefixes; driven by this one
+};
+
+}  // namespace tessera

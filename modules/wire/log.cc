@@ -1,0 +1,172 @@
+#include "wire/log.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "core/errors.h"
+#include "messages/channels.h"
+#include "wire/codec.h"
+#include "wire/log_file.h"
+
+namespace tessera {
+namespace {
+
+// Where a message of a stream lies in the log.
+struct Place {
+  int64_t sequence = 0;
+  int64_t position = 0;  // bytes from the front
+  int32_t part = 0;
+  int32_t num_parts = 1;
+};
+
+// One camera's messages on one channel, in order of their numbers.
+struct RecordedStream {
+  std::vector<Place> places;
+  size_t next = 0;
+
+  bool done() const { return next >= places.size(); }
+  int64_t position() const { return places[next].position; }
+};
+
+using StreamName = std::pair<std::string, int64_t>;  // publisher and its start
+
+std::array<const Channel*, 4> CameraChannels() {
+  return {&kCalibrationChannel, &kGroundTruthChannel, &kCameraChannel, &kEndOfStreamChannel};
+}
+
+}  // namespace
+
+struct LogReader::Impl {
+  Impl(const std::string& log_path, const std::string& prefix);
+  void Index(const std::string& prefix);
+  RecordedStream Order(const std::string& channel, std::vector<Place> places) const;
+  template <class Value>
+  std::optional<LoggedValue> Join(ValueJoiner<Value>& joiner, const LogEvent& event, const MessageHeader& header);
+  std::optional<LoggedValue> Take(size_t channel);
+
+  std::string path;
+  LogFileReader file;
+  std::array<RecordedStream, 4> streams;  // in the order of CameraChannels()
+  int64_t num_frames = 0;
+  ValueJoiner<CameraCalibration> calibrations;
+  ValueJoiner<GroundTruthPose> truths;
+  ValueJoiner<CameraFrame> frames;
+  ValueJoiner<EndOfStream> ends;
+};
+
+LogReader::Impl::Impl(const std::string& log_path, const std::string& prefix) : path(log_path), file(log_path) {
+  Index(prefix);
+}
+
+// Finds the messages of the one camera that the log must hold.
+void LogReader::Impl::Index(const std::string& prefix) {
+  std::array<std::map<StreamName, std::vector<Place>>, 4> found;
+  LogEvent event;
+  for (int64_t position = file.position(); file.Next(&event); position = file.position()) {
+    for (size_t i = 0; i < found.size(); ++i) {
+      if (event.channel != prefix + CameraChannels()[i]->name) continue;
+      if (const auto header = ReadHeader(event.data)) {
+        found[i][{header->publisher, header->epoch_us}].push_back(
+            {header->sequence, position, header->part, header->num_parts});
+      }
+    }
+  }
+  const auto& cameras = found[2];
+  if (cameras.empty()) {
+    throw InputError("log " + path + " has no CAMERA messages: record the source with `procman/tessera record`");
+  }
+  if (cameras.size() > 1) {
+    throw InputError("log " + path + " holds " + std::to_string(cameras.size()) +
+                     " recordings of a camera: record each into a log of its own");
+  }
+  const StreamName camera = cameras.begin()->first;
+  for (size_t i = 0; i < found.size(); ++i) {
+    streams[i] = Order(CameraChannels()[i]->name, std::move(found[i][camera]));
+  }
+  num_frames = std::count_if(streams[2].places.begin(), streams[2].places.end(),
+                             [](const Place& place) { return place.part == 0; });
+}
+
+// By number, each once, from the first whole value on. Throws InputError if some are missing in between.
+RecordedStream LogReader::Impl::Order(const std::string& channel, std::vector<Place> places) const {
+  std::stable_sort(places.begin(), places.end(),
+                   [](const Place& a, const Place& b) { return a.sequence < b.sequence; });
+  const auto same = [](const Place& a, const Place& b) { return a.sequence == b.sequence; };
+  places.erase(std::unique(places.begin(), places.end(), same), places.end());
+  const auto whole = std::find_if(places.begin(), places.end(), [](const Place& place) { return place.part == 0; });
+  places.erase(places.begin(), whole);
+  const bool has_gap =
+      !places.empty() && places.back().sequence - places.front().sequence + 1 != static_cast<int64_t>(places.size());
+  if (has_gap || (!places.empty() && places.back().part + 1 != places.back().num_parts)) {
+    throw InputError("log " + path + " lacks messages on " + channel +
+                     ": it was cut, or recorded with losses; record it again with `procman/tessera record`");
+  }
+  return {std::move(places), 0};
+}
+
+template <class Value>
+std::optional<LoggedValue> LogReader::Impl::Join(ValueJoiner<Value>& joiner, const LogEvent& event,
+                                                 const MessageHeader& header) {
+  switch (joiner.Add(event.data, header)) {
+    case ValueJoiner<Value>::Result::kIncomplete:
+      return std::nullopt;
+    case ValueJoiner<Value>::Result::kComplete:
+      return joiner.value();
+    case ValueJoiner<Value>::Result::kRefused:
+      break;
+  }
+  throw InputError("log " + path + " holds a damaged message on " + event.channel + ": " + joiner.problem());
+}
+
+// The value that the next message of the channel completes, if it does.
+std::optional<LoggedValue> LogReader::Impl::Take(size_t channel) {
+  RecordedStream& stream = streams[channel];
+  file.Seek(stream.position());
+  ++stream.next;
+  LogEvent event;
+  file.Next(&event);
+  const auto header = ReadHeader(event.data);
+  if (!header) {
+    throw InputError("log " + path + " changed while it was read");
+  }
+  switch (channel) {
+    case 0:
+      return Join(calibrations, event, *header);
+    case 1:
+      return Join(truths, event, *header);
+    case 2:
+      return Join(frames, event, *header);
+    default:
+      return Join(ends, event, *header);
+  }
+}
+
+LogReader::LogReader(const std::string& path, const std::string& channel_prefix)
+    : impl_(std::make_unique<Impl>(path, channel_prefix)) {}
+
+LogReader::~LogReader() = default;
+
+std::optional<LoggedValue> LogReader::Next() {
+  while (true) {
+    size_t earliest = impl_->streams.size();
+    for (size_t i = 0; i < impl_->streams.size(); ++i) {
+      if (!impl_->streams[i].done() &&
+          (earliest == impl_->streams.size() || impl_->streams[i].position() < impl_->streams[earliest].position())) {
+        earliest = i;
+      }
+    }
+    if (earliest == impl_->streams.size()) {
+      return std::nullopt;
+    }
+    if (auto value = impl_->Take(earliest)) {
+      return value;
+    }
+  }
+}
+
+int64_t LogReader::num_frames() const { return impl_->num_frames; }
+
+}  // namespace tessera

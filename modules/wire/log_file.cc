@@ -1,0 +1,125 @@
+#include "wire/log_file.h"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "core/errors.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint64_t kSync = 0xEDA1DA01;
+constexpr size_t kHeaderBytes = 4 + 8 + 8 + 4 + 4;
+constexpr uint64_t kMaxChannelLength = 255;
+
+void PutBigEndian(uint64_t value, size_t size, uint8_t* bytes) {
+  for (size_t i = 0; i < size; ++i) {
+    bytes[i] = static_cast<uint8_t>(value >> (8 * (size - 1 - i)));
+  }
+}
+
+uint64_t GetBigEndian(const uint8_t* bytes, size_t size) {
+  uint64_t value = 0;
+  for (size_t i = 0; i < size; ++i) {
+    value = (value << 8) | bytes[i];
+  }
+  return value;
+}
+
+}  // namespace
+
+LogFileReader::LogFileReader(const std::string& path) : path_(path) {
+  if (!std::filesystem::is_regular_file(path)) {
+    throw InputError("log " + path + " does not exist or is not a file: check the path");
+  }
+  file_.reset(std::fopen(path.c_str(), "rb"));
+  if (!file_) {
+    throw InputError("log " + path + " can't be opened (" + std::strerror(errno) + "): check its permissions");
+  }
+  size_ = static_cast<int64_t>(std::filesystem::file_size(path));
+  std::array<uint8_t, 4> sync{};
+  if (std::fread(sync.data(), 1, sync.size(), file_.get()) != sync.size() || GetBigEndian(sync.data(), 4) != kSync) {
+    throw InputError("log " + path + " is not an LCM log: record one with `tessera record` or lcm-logger");
+  }
+  Seek(0);
+}
+
+bool LogFileReader::Next(LogEvent* event) {
+  std::array<uint8_t, kHeaderBytes> header{};
+  const size_t num_read = std::fread(header.data(), 1, header.size(), file_.get());
+  if (num_read == 0) {
+    return false;
+  }
+  const uint64_t channel_length = GetBigEndian(header.data() + 20, 4);
+  const uint64_t data_length = GetBigEndian(header.data() + 24, 4);
+  // Lengths are believed only as far as the file reaches.
+  if (num_read < header.size() || GetBigEndian(header.data(), 4) != kSync || channel_length > kMaxChannelLength ||
+      channel_length + data_length > static_cast<uint64_t>(size_ - position())) {
+    ThrowCut();
+  }
+  event->time_us = static_cast<int64_t>(GetBigEndian(header.data() + 12, 8));
+  event->channel.resize(channel_length);
+  event->data.resize(data_length);
+  if (std::fread(event->channel.data(), 1, channel_length, file_.get()) != channel_length ||
+      std::fread(event->data.data(), 1, data_length, file_.get()) != data_length) {
+    ThrowCut();
+  }
+  return true;
+}
+
+int64_t LogFileReader::position() const { return std::ftell(file_.get()); }
+
+void LogFileReader::Seek(int64_t position) { std::fseek(file_.get(), position, SEEK_SET); }
+
+void LogFileReader::ThrowCut() const {
+  throw InputError("log " + path_ + " is cut off or damaged before byte " + std::to_string(position()) + " of " +
+                   std::to_string(size_) + ": record or copy it again");
+}
+
+LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(std::fopen((path + ".part").c_str(), "wb")) {
+  if (file_ == nullptr) {
+    ThrowUnwritable(path + ".part");
+  }
+}
+
+LogFileWriter::~LogFileWriter() {
+  if (file_ == nullptr) return;
+  std::fclose(file_);
+  std::remove((path_ + ".part").c_str());
+}
+
+void LogFileWriter::Write(int64_t time_us, const std::string& channel, ByteView data) {
+  std::array<uint8_t, kHeaderBytes> header{};
+  PutBigEndian(kSync, 4, header.data());
+  PutBigEndian(static_cast<uint64_t>(num_events_), 8, header.data() + 4);
+  PutBigEndian(static_cast<uint64_t>(time_us), 8, header.data() + 12);
+  PutBigEndian(channel.size(), 4, header.data() + 20);
+  PutBigEndian(data.size(), 4, header.data() + 24);
+  if (std::fwrite(header.data(), 1, header.size(), file_) != header.size() ||
+      std::fwrite(channel.data(), 1, channel.size(), file_) != channel.size() ||
+      std::fwrite(data.data(), 1, data.size(), file_) != data.size()) {
+    ThrowUnwritable(path_ + ".part");
+  }
+  ++num_events_;
+  num_bytes_ += static_cast<int64_t>(header.size() + channel.size() + data.size());
+}
+
+void LogFileWriter::Close() {
+  if (file_ == nullptr) return;
+  const bool is_written = std::fclose(file_) == 0;
+  file_ = nullptr;
+  if (is_written && std::rename((path_ + ".part").c_str(), path_.c_str()) == 0) return;
+  const int problem = errno;
+  std::remove((path_ + ".part").c_str());
+  errno = problem;
+  ThrowUnwritable(path_);
+}
+
+void LogFileWriter::ThrowUnwritable(const std::string& path) const {
+  throw InputError("log " + path + " can't be written (" + std::strerror(errno) +
+                   "): check the folder, its permissions and the room on the disk");
+}
+
+}  // namespace tessera

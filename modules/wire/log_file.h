@@ -1,0 +1,69 @@
+// LCM log files, event by event. A log is a row of events, numbers most significant byte first:
+//   0xEDA1DA01 (4 bytes), number (8), time in us (8), length of the channel (4), of the data (4), channel, data.
+// Read and written here rather than by LCM, whose reader believes the lengths and can't tell a damaged log from its
+// end.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "wire/bytes.h"
+
+namespace tessera {
+
+struct LogEvent {
+  int64_t time_us = 0;
+  std::string channel;
+  Bytes data;
+};
+
+class LogFileReader {
+ public:
+  // Throws InputError if there is no such file or it is not an LCM log.
+  explicit LogFileReader(const std::string& path);
+
+  // False at the end of the file. Throws InputError if an event is damaged or cut off.
+  bool Next(LogEvent* event);
+  // Where the next event begins, bytes from the front; and going there.
+  int64_t position() const;
+  void Seek(int64_t position);
+
+ private:
+  struct CloseFile {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  [[noreturn]] void ThrowCut() const;
+
+  std::string path_;
+  std::unique_ptr<std::FILE, CloseFile> file_;
+  int64_t size_ = 0;
+};
+
+class LogFileWriter {
+ public:
+  // Writes into PATH.part, which takes the name PATH when it is closed: no log is ever half written. Throws InputError
+  // if it can't be written.
+  explicit LogFileWriter(const std::string& path);
+  ~LogFileWriter();  // without Close(): nothing is kept
+  LogFileWriter(const LogFileWriter&) = delete;
+  LogFileWriter& operator=(const LogFileWriter&) = delete;
+
+  // Throws InputError if the disk is full.
+  void Write(int64_t time_us, const std::string& channel, ByteView data);
+  void Close();
+
+  int64_t num_events() const { return num_events_; }
+  int64_t num_bytes() const { return num_bytes_; }
+
+ private:
+  [[noreturn]] void ThrowUnwritable(const std::string& path) const;
+
+  std::string path_;
+  std::FILE* file_;
+  int64_t num_events_ = 0;
+  int64_t num_bytes_ = 0;
+};
+
+}  // namespace tessera

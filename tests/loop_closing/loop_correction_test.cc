@@ -1,0 +1,139 @@
+// How a loop's error is spread over a map.
+#include "loop_closing/loop_correction.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "map/map_editor.h"
+#include "map/spanning_tree.h"
+#include "mapping/map_bending.h"
+#include "support/synthetic_circuit.h"
+
+namespace tessera {
+namespace {
+
+std::shared_ptr<const FeatureFrame> FeaturesOf(int64_t frame, SensorType sensor) {
+  auto features = std::make_shared<FeatureFrame>();
+  features->frame = {frame};
+  features->calibration.sensor = sensor;
+  return features;
+}
+
+// The circuit as odometry left it, a chain of keyframes that see nothing.
+Map MapOf(const SyntheticCircuit& circuit, SensorType sensor) {
+  Map map;
+  MapEditor editor(map);
+  for (const PoseGraphNode& node : circuit.problem.nodes) {
+    editor.AddKeyframe(node.id, {node.id.value - 1}, Sim3::From(node.world_from_keyframe.Pose()),
+                       FeaturesOf(node.id.value, sensor));
+  }
+  (void)editor.Finish(circuit.problem.nodes.back().id);
+  return map;
+}
+
+VerifiedPlace LoopOf(const SyntheticCircuit& circuit) { return {{0}, circuit.problem.edges.back().to_from_from, {}}; }
+
+std::vector<Sim3> PlacesOf(const Map& map) {
+  std::vector<Sim3> places;
+  map.keyframes().ForEach(
+      [&](KeyframeId, const Keyframe& keyframe) { places.push_back(keyframe.WorldFromKeyframe()); });
+  return places;
+}
+
+TEST(LoopCorrection, SpreadsTheErrorOfALoopOverTheRing) {
+  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
+    SyntheticCircuitOptions options;
+    options.num_keyframes = 120;
+    options.has_scale = sensor == SensorType::kMono;
+    options.log_scale_drift = options.has_scale ? 0.3 : 0.0;
+    const SyntheticCircuit circuit = MakeSyntheticCircuit(options);
+    Map map = MapOf(circuit, sensor);
+    const std::vector<Sim3> before = PlacesOf(map);
+    const KeyframeId current{119};
+    const VerifiedPlace place = LoopOf(circuit);
+    const auto corrections = CorrectMap(map, current, place, {});
+    ASSERT_EQ(corrections.size(), 120U);
+    Corrections bend;
+    for (size_t i = 0; i < corrections.size(); ++i) {
+      EXPECT_EQ(corrections[i].id, KeyframeId{static_cast<int64_t>(i)});
+      bend[corrections[i].id] = corrections[i].new_world_from_old;
+      if (!options.has_scale) {
+        EXPECT_NEAR(corrections[i].new_world_from_old.scale, 1.0, 1e-12);
+      }
+    }
+    MapEditor editor(map);
+    BendMap(bend, editor);
+    (void)editor.Finish(current);
+    const std::vector<Sim3> after = PlacesOf(map);
+    EXPECT_LT((after[0].translation - before[0].translation).norm(), 1e-12) << "the root stays";
+    EXPECT_LT(CircuitError(circuit, after, 1.0), 0.4 * CircuitError(circuit, before, 1.0)) << ToString(sensor);
+    // The ends meet, and no step gives way by more than a few parts of a hundred.
+    const Sim3 gap = place.matched_from_current.Inverse() * (after[0].Inverse() * after[119]);
+    EXPECT_LT(gap.translation.norm(), 0.5);
+    EXPECT_NEAR(gap.scale, 1.0, 0.03);
+    for (size_t i = 1; i < after.size(); ++i) {
+      const Sim3 step = (before[i - 1].Inverse() * before[i]).Inverse() * (after[i - 1].Inverse() * after[i]);
+      EXPECT_LT(step.translation.norm(), 0.1) << i;
+      EXPECT_NEAR(step.scale, 1.0, 0.02) << i;
+    }
+  }
+}
+
+TEST(LoopCorrection, OldLoopsStayInTheGraph) {
+  SyntheticCircuitOptions options;
+  options.num_keyframes = 40;
+  const SyntheticCircuit circuit = MakeSyntheticCircuit(options);
+  Map map = MapOf(circuit, SensorType::kMono);
+  const size_t num_before = BuildEssentialGraph(map, {39}, LoopOf(circuit), {}).edges.size();
+  EXPECT_EQ(num_before, 39U + 1U) << "the tree and the new loop";
+  MapEditor editor(map);
+  editor.AddClosedLoop({{20}, {5}, 1.0, 50});
+  editor.AddClosedLoop({{21}, {20}, 1.0, 50});  // an edge of the tree already
+  (void)editor.Finish({39});
+  const PoseGraphProblem problem = BuildEssentialGraph(map, {39}, LoopOf(circuit), {});
+  EXPECT_EQ(problem.edges.size(), num_before + 1);
+  EXPECT_EQ(problem.Check(), "");
+  for (const PoseGraphNode& node : problem.nodes) EXPECT_EQ(node.is_fixed, node.id == KeyframeId{0});
+  EXPECT_TRUE(problem.has_scale);
+}
+
+// Two parts: the one that began later moves as a whole, whichever of them the loop was found in.
+TEST(LoopCorrection, JoinsTwoParts) {
+  for (const bool is_found_in_later : {true, false}) {
+    Map map;
+    MapEditor editor(map);
+    const auto pose = [](int64_t k) {
+      return Rigid3{ExpSO3({0.0, 0.1 * static_cast<double>(k), 0.0}), {0.0, 0.0, static_cast<double>(k)}};
+    };
+    // 0 <- 1 <- 4 <- 5, and 2 <- 3: the older part was gone on with.
+    const std::vector<int64_t> parents{-1, 0, -1, 2, 1, 4};
+    for (int64_t k = 0; k < 6; ++k) {
+      editor.AddKeyframe({k}, {parents[static_cast<size_t>(k)]}, Sim3::From(pose(k)), FeaturesOf(k, SensorType::kMono));
+    }
+    (void)editor.Finish({5});
+    const KeyframeId current = is_found_in_later ? KeyframeId{3} : KeyframeId{5};
+    const KeyframeId matched = is_found_in_later ? KeyframeId{1} : KeyframeId{3};
+    const Sim3 measured{1.4, ExpSO3({0.0, 0.3, 0.1}), {0.5, 0.0, 0.2}};
+    const auto corrections = CorrectMap(map, current, {matched, measured, {}}, {});
+    ASSERT_EQ(corrections.size(), 2U);
+    EXPECT_EQ(corrections[0].id, KeyframeId{2});
+    EXPECT_EQ(corrections[1].id, KeyframeId{3});
+    MapEditor bending(map);
+    BendMap({{{2}, corrections[0].new_world_from_old}, {{3}, corrections[1].new_world_from_old}}, bending);
+    (void)bending.Finish({5});
+    const Sim3 joined =
+        map.FindKeyframe(matched)->WorldFromKeyframe().Inverse() * map.FindKeyframe(current)->WorldFromKeyframe();
+    EXPECT_NEAR(joined.scale, measured.scale, 1e-12);
+    EXPECT_LT((joined.translation - measured.translation).norm(), 1e-9);
+    EXPECT_LT(joined.rotation.angularDistance(measured.rotation), 1e-7);
+    for (const int64_t k : {0, 1, 4, 5}) {
+      EXPECT_EQ(map.FindKeyframe({k})->world_from_camera.translation, pose(k).translation);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tessera

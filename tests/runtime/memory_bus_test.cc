@@ -1,0 +1,342 @@
+// Whole stages' worth of transport over memq://: values, losses, latecomers, failures.
+#include "runtime/memory_bus.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/errors.h"
+#include "support/example_values.h"
+
+namespace tessera {
+namespace {
+
+Settings Defaults() { return Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml"); }
+
+// The channel of each type does not matter here.
+struct SendAndReceive {
+  template <class Value>
+  void operator()() const {
+    if constexpr (!std::is_same_v<Value, Heartbeat> && !std::is_same_v<Value, RepairRequest>) {
+      SCOPED_TRACE(TypeName<Value>());
+      MemoryBus bus(Defaults());
+      std::vector<Value> received;
+      MessageInfo info;
+      bus.AddContext("listener").Subscribe<Value>(kPoseChannel, [&](const Value& value, const MessageInfo& value_info) {
+        received.push_back(value);
+        info = value_info;
+      });
+      StageContext& sender = bus.AddContext("sender");
+      const auto publisher = sender.Advertise<Value>(kPoseChannel);
+      std::mt19937 generator(9);
+      std::vector<Value> sent;
+      for (int i = 0; i < 5; ++i) {
+        sent.push_back(DrawValue<Value>(generator, 1));
+        publisher.Publish(sent.back());
+      }
+      ASSERT_TRUE(bus.RunUntil([&] { return received.size() == sent.size(); }, 1.0));
+      for (size_t i = 0; i < sent.size(); ++i) EXPECT_TRUE(AreSame(sent[i], received[i]));
+      EXPECT_EQ(info.publisher, "sender");
+      EXPECT_EQ(info.epoch_us, sender.epoch_us());
+      EXPECT_GE(info.arrival_us, info.publish_us);
+    }
+  }
+};
+
+TEST(MemoryBus, EveryTypeArrives) { ForEachSentType(SendAndReceive()); }
+
+// A camera that sends frames, and a listener that counts them.
+class Pair {
+ public:
+  explicit Pair(MemoryBus& bus) : bus_(bus) {}
+
+  void StartListener() {
+    bus_.AddContext("listener")
+        .Subscribe<CameraFrame>(kCameraChannel, [this](const CameraFrame& frame, const MessageInfo&) {
+          received.push_back(frame.id.value);
+        });
+    bus_.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel,
+                                                      [this](const StageStatus& new_status, const MessageInfo&) {
+                                                        if (new_status.name == "listener") status = new_status;
+                                                      });
+  }
+  void StartCamera() { frames_ = bus_.AddContext("camera").Advertise<CameraFrame>(kCameraChannel); }
+  void Send(int num_frames) {
+    for (int i = 0; i < num_frames; ++i) {
+      CameraFrame frame{.id = {num_sent_++}, .left = GrayImage(500, 400)};
+      frames_.Publish(frame);
+    }
+  }
+  void ExpectReceived(int64_t first, int64_t last) const {
+    ASSERT_EQ(received.size(), static_cast<size_t>(last - first + 1));
+    for (size_t i = 0; i < received.size(); ++i) EXPECT_EQ(received[i], first + static_cast<int64_t>(i));
+  }
+
+  std::vector<int64_t> received;
+  StageStatus status;
+
+ private:
+  MemoryBus& bus_;
+  Publisher<CameraFrame> frames_;
+  int64_t num_sent_ = 0;
+};
+
+TEST(MemoryBus, LossesAreRepairedAndCounted) {
+  MemoryBus bus(Defaults());
+  std::mt19937 generator(1);
+  bus.LoseMessages([&](const std::string& channel) { return channel != "STATUS" && generator() % 5 == 0; });
+  Pair pair(bus);
+  pair.StartListener();
+  pair.StartCamera();
+  pair.Send(100);
+  ASSERT_TRUE(bus.RunUntil([&] { return pair.received.size() == 100; }));
+  pair.ExpectReceived(0, 99);
+  bus.RunUntilQuiet();
+  EXPECT_GT(pair.status.num_repaired, 20);
+  EXPECT_EQ(pair.status.num_lost, 0);
+  EXPECT_EQ(pair.status.num_received, 100);
+}
+
+TEST(MemoryBus, WhoComesLateGetsWhatIsKept) {
+  MemoryBus bus(Defaults());
+  Pair pair(bus);
+  pair.StartCamera();
+  pair.Send(30);
+  bus.RunUntilQuiet();
+  pair.StartListener();
+  ASSERT_TRUE(bus.RunUntil([&] { return pair.received.size() == 30; }));
+  pair.ExpectReceived(0, 29);
+}
+
+TEST(MemoryBus, WhatNobodyKeepsIsCountedAsLost) {
+  Settings settings = Defaults();
+  settings.Override("stream.history_bytes=1000000");  // five frames
+  MemoryBus bus(settings);
+  bool loses = false;
+  bus.LoseMessages([&](const std::string& channel) { return loses && channel == "CAMERA"; });
+  Pair pair(bus);
+  pair.StartListener();
+  pair.StartCamera();
+  pair.Send(2);
+  bus.RunUntilQuiet();
+  loses = true;
+  pair.Send(20);
+  loses = false;
+  pair.Send(1);
+  ASSERT_TRUE(bus.RunUntil([&] { return !pair.received.empty() && pair.received.back() == 22; }));
+  bus.RunUntilQuiet();
+  EXPECT_LT(pair.received.size(), 10U);
+  EXPECT_GE(pair.status.num_lost, 16 * 4);
+  EXPECT_NE(pair.status.last_error.find("CAMERA"), std::string::npos);
+}
+
+TEST(MemoryBus, ARestartedPublisherIsHeard) {
+  MemoryBus bus(Defaults());
+  Pair pair(bus);
+  pair.StartListener();
+  pair.StartCamera();
+  pair.Send(3);
+  bus.RunUntilQuiet();
+  bus.Kill("camera");
+  bus.RunUntilQuiet(2.0);
+  pair.StartCamera();
+  pair.Send(3);
+  ASSERT_TRUE(bus.RunUntil([&] { return pair.received.size() == 6; }));
+}
+
+TEST(MemoryBus, ASecondPublisherEndsWithASentence) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("tracker").Advertise<PoseEstimate>(kPoseChannel);
+  bus.AddContext("other_tracker").Advertise<PoseEstimate>(kPoseChannel);
+  ASSERT_TRUE(bus.RunUntil([&] { return bus.exit_status("other_tracker") != 0; }));
+  EXPECT_EQ(bus.exit_status("other_tracker"), 1);
+  EXPECT_NE(bus.failure("other_tracker").find("POSE already has a publisher: tracker"), std::string::npos);
+  EXPECT_EQ(bus.exit_status("tracker"), 0);
+  // One that starts while the other is known already is refused at once.
+  EXPECT_THROW(
+      {
+        StageContext& third = bus.AddContext("third_tracker");
+        bus.RunUntilQuiet();
+        third.Advertise<PoseEstimate>(kPoseChannel);
+      },
+      std::runtime_error);
+}
+
+TEST(MemoryBus, ASecondProcessOfTheSameNameEnds) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("extractor_0");
+  StageContext& second = bus.AddContext("extractor_0", 0);
+  int num_sent_after_failing = 0;
+  bus.RunUntilQuiet();
+  bus.AddContext("watcher").Subscribe<ExtractorReady>(
+      kExtractorReadyChannel, [&](const ExtractorReady&, const MessageInfo&) { ++num_sent_after_failing; });
+  second.Advertise<ExtractorReady>(kExtractorReadyChannel, Publishers::kMany).Publish({.extractor = 0});
+  bus.RunUntilQuiet();
+  EXPECT_EQ(num_sent_after_failing, 0);
+}
+
+TEST(MemoryBus, SeveralPublishersMayShareAChannelThatAllowsIt) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("extractor_0").Advertise<TileFeatures>(kTileFeaturesChannel, Publishers::kMany);
+  bus.AddContext("extractor_1").Advertise<TileFeatures>(kTileFeaturesChannel, Publishers::kMany);
+  bus.RunUntilQuiet();
+  EXPECT_EQ(bus.exit_status("extractor_0") + bus.exit_status("extractor_1"), 0);
+}
+
+TEST(JoinRobot, EachPrefixHasStreamsOfItsOwn) {
+  MemoryBus bus(Defaults());
+  std::mt19937 generator(3);
+  bus.LoseMessages([&](const std::string&) { return generator() % 4 == 0; });
+  StageContext& process = bus.AddContext("dispatcher");
+  const auto own = process.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  const auto of_a = process.JoinRobot("a_").Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  std::map<std::string, std::vector<int64_t>> heard;
+  std::set<std::string> statuses;
+  for (const std::string prefix : {"", "a_", "b_"}) {
+    StageContext& listener = bus.AddContext(prefix + "listener", 0, {"bus.channel_prefix=" + prefix});
+    listener.Subscribe<EndOfStream>(kEndOfStreamChannel, [&heard, prefix](const EndOfStream& end, const MessageInfo&) {
+      heard[prefix].push_back(end.num_frames);
+    });
+    listener.Subscribe<StageStatus>(kStatusChannel, [&statuses, prefix](const StageStatus& status, const MessageInfo&) {
+      if (status.name == "dispatcher") statuses.insert(prefix);
+    });
+  }
+  for (int64_t i = 0; i < 20; ++i) {
+    own.Publish({.stage = "dispatcher", .num_frames = i});
+    of_a.Publish({.stage = "dispatcher", .num_frames = 100 + i});
+  }
+  ASSERT_TRUE(bus.RunUntil([&] { return heard[""].size() >= 20 && heard["a_"].size() >= 20 && statuses.size() >= 2; }));
+  bus.RunUntilQuiet();
+  for (int64_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(heard[""].at(static_cast<size_t>(i)), i);
+    EXPECT_EQ(heard["a_"].at(static_cast<size_t>(i)), 100 + i);
+  }
+  EXPECT_TRUE(heard["b_"].empty());
+  EXPECT_EQ(statuses, (std::set<std::string>{"", "a_"}));
+}
+
+TEST(JoinRobot, ANamesakeUnderOnePrefixSilencesOnlyThat) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("extractor_0", 0, {"bus.channel_prefix=a_"});
+  bus.RunUntilQuiet();
+  StageContext& pool = bus.AddContext("extractor_0");
+  StageContext& under_a = pool.JoinRobot("a_");
+  StageContext& under_b = pool.JoinRobot("b_");
+  std::string last_error;
+  bus.AddContext("watcher").Subscribe<StageStatus>(
+      kStatusChannel, [&](const StageStatus& status, const MessageInfo&) { last_error = status.last_error; });
+  ASSERT_TRUE(bus.RunUntil([&] { return !last_error.empty(); }));
+  EXPECT_NE(last_error.find("`a_`"), std::string::npos) << last_error;
+  EXPECT_NE(last_error.find("another process has this name already"), std::string::npos) << last_error;
+  EXPECT_TRUE(under_a.fell_silent());
+  EXPECT_FALSE(under_b.fell_silent());
+  EXPECT_FALSE(pool.fell_silent());
+}
+
+TEST(MemoryBus, AHandlerThatThrowsIsReportedAndTheStageGoesOn) {
+  MemoryBus bus(Defaults());
+  StageContext& stage = bus.AddContext("stage");
+  int num_handled = 0;
+  stage.Subscribe<EndOfStream>(kEndOfStreamChannel, [&](const EndOfStream&, const MessageInfo&) {
+    if (++num_handled == 1) throw std::runtime_error("no idea what to do");
+  });
+  std::string last_error;
+  bus.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel, [&](const StageStatus& status, const MessageInfo&) {
+    if (status.name == "stage") last_error = status.last_error;
+  });
+  const auto publisher = bus.AddContext("camera").Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  publisher.Publish({.stage = "camera"});
+  publisher.Publish({.stage = "camera"});
+  ASSERT_TRUE(bus.RunUntil([&] { return num_handled == 2 && !last_error.empty(); }));
+  EXPECT_NE(last_error.find("no idea what to do"), std::string::npos);
+}
+
+TEST(MemoryBus, MessagesOfAnotherTypeAreCounted) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("stage").Subscribe<EndOfStream>(kPoseChannel, [](const EndOfStream&, const MessageInfo&) { FAIL(); });
+  int64_t num_undecodable = 0;
+  bus.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel, [&](const StageStatus& status, const MessageInfo&) {
+    if (status.name == "stage") num_undecodable = status.num_undecodable;
+  });
+  bus.AddContext("tracker").Advertise<PoseEstimate>(kPoseChannel).Publish({.frame = {0}});
+  ASSERT_TRUE(bus.RunUntil([&] { return num_undecodable == 1; }));
+}
+
+TEST(MemoryBus, TimersAndIdleTasksRunByTheBusesClock) {
+  MemoryBus bus(Defaults());
+  StageContext& stage = bus.AddContext("stage");
+  int num_ticks = 0;
+  int num_idle = 0;
+  stage.Every(std::chrono::milliseconds(100), [&] { ++num_ticks; });
+  int64_t burst_us = 0;
+  stage.WhenIdle([&] {
+    if (num_idle % 5 == 0) burst_us = stage.now_us();
+    EXPECT_EQ(stage.now_us(), burst_us);  // as long as it returns true, no time passes
+    return ++num_idle % 5 != 0;
+  });
+  const int64_t begin_us = stage.now_us();
+  ASSERT_TRUE(bus.RunUntil([&] { return num_ticks == 51; }));
+  EXPECT_NEAR(static_cast<double>(stage.now_us() - begin_us), 5e6, 1e5);
+  EXPECT_GE(num_idle, 5 * 50);
+}
+
+TEST(MemoryBus, StatusTellsOfTheStage) {
+  MemoryBus bus(Defaults());
+  StageContext& stage = bus.AddContext("stage");
+  StageStatus status;
+  bus.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel,
+                                                   [&](const StageStatus& new_status, const MessageInfo&) {
+                                                     if (new_status.name == "stage") status = new_status;
+                                                   });
+  for (int i = 1; i <= 100; ++i) stage.RecordStep(i);
+  stage.SetQueue(4);
+  stage.AddDropped(2);
+  stage.SetValue("landmarks", 17);
+  stage.SetValue("landmarks", 18);
+  stage.Finish();
+  EXPECT_TRUE(stage.finished());
+  ASSERT_TRUE(bus.RunUntil([&] { return status.state == StageState::kFinished; }, 1.0));
+  EXPECT_EQ(status.step.count, 100);
+  EXPECT_NEAR(status.step.mean_ms, 50.5, 1e-9);
+  EXPECT_NEAR(status.step.median_ms, 50.0, 1.0);
+  EXPECT_NEAR(status.step.p95_ms, 95.0, 1.0);
+  EXPECT_EQ(status.step.max_ms, 100.0);
+  EXPECT_EQ(status.queue, 4);
+  EXPECT_EQ(status.num_dropped, 2);
+  ASSERT_EQ(status.values.size(), 1U);
+  EXPECT_EQ(status.values[0].second, 18.0);
+  EXPECT_GT(status.rss_mb, 1.0);
+}
+
+TEST(MemoryBus, SameRunTwiceIsTheSame) {
+  const auto run = [] {
+    MemoryBus bus(Defaults());
+    std::mt19937 generator(3);
+    bus.LoseMessages([&](const std::string&) { return generator() % 7 == 0; });
+    Pair pair(bus);
+    pair.StartListener();
+    pair.StartCamera();
+    pair.Send(40);
+    bus.RunUntilQuiet();
+    return std::pair(pair.status.num_repaired, bus.AddContext("late").now_us());
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST(StreamSettings, AreChecked) {
+  for (const char* assignment : {"bus.max_message_bytes=100", "bus.max_message_bytes=70000", "stream.history_bytes=0",
+                                 "stream.heartbeat_ms=0", "stream.repair_ms=0", "bus.channel_prefix=a b"}) {
+    Settings settings = Defaults();
+    settings.Override(assignment);
+    MemoryBus bus(settings);
+    EXPECT_THROW(bus.AddContext("stage"), InputError) << assignment;
+  }
+}
+
+}  // namespace
+}  // namespace tessera

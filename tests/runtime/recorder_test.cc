@@ -1,0 +1,97 @@
+// The recorder's log has every message of every stream once and in order, whatever the network loses.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/errors.h"
+#include "runtime/memory_bus.h"
+#include "stages/recorder/recorder_stage.h"
+#include "support/example_values.h"
+#include "wire/codec.h"
+#include "wire/log_file.h"
+
+namespace tessera {
+namespace {
+
+class RecorderTest : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directories(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Settings MakeSettings(const std::string& prefix) const {
+    Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
+    settings.Override("recorder.path=" + path_);
+    settings.Override("bus.channel_prefix=" + prefix);
+    return settings;
+  }
+  // The numbers of the messages in the log, by channel, and the times in order.
+  std::map<std::string, std::vector<int64_t>> ReadNumbers() const {
+    std::map<std::string, std::vector<int64_t>> numbers;
+    LogFileReader reader(path_);
+    int64_t time_us = 0;
+    for (LogEvent event; reader.Next(&event); time_us = event.time_us) {
+      EXPECT_GE(event.time_us, time_us);
+      const auto header = ReadHeader(event.data);
+      numbers[event.channel].push_back(header ? header->sequence : -1);
+    }
+    return numbers;
+  }
+  static std::vector<int64_t> Counted(size_t count) {
+    std::vector<int64_t> numbers(count);
+    for (size_t i = 0; i < count; ++i) numbers[i] = static_cast<int64_t>(i);
+    return numbers;
+  }
+
+  const std::string folder_ = testing::TempDir() + "recorder_test";
+  const std::string path_ = folder_ + "/run.lcmlog";
+};
+
+TEST_F(RecorderTest, HasEveryMessageOnceInOrder) {
+  MemoryBus bus(MakeSettings("robot/"));
+  std::mt19937 generator(4);
+  bus.LoseMessages([&](const std::string&) { return generator() % 6 == 0; });
+  bus.Start<RecorderStage>("recorder");
+  const auto frames = bus.AddContext("camera").Advertise<CameraFrame>(kCameraChannel);
+  const auto jobs = bus.AddContext("dispatcher").Advertise<TileJob>(TileChannel(3));
+  for (int i = 0; i < 20; ++i) {
+    frames.Publish(DrawValue<CameraFrame>(generator, 1));
+    jobs.Publish(DrawValue<TileJob>(generator, 1));
+  }
+  bus.RunUntilQuiet(2.0);
+  bus.Kill("recorder");  // its destructor closes the log
+  const auto numbers = ReadNumbers();
+  for (const std::string channel : {"robot/CAMERA", "robot/TILE_3"}) {
+    ASSERT_TRUE(numbers.contains(channel));
+    EXPECT_GE(numbers.at(channel).size(), 20U) << channel;
+    EXPECT_EQ(numbers.at(channel), Counted(numbers.at(channel).size())) << channel;
+  }
+  EXPECT_TRUE(numbers.contains("robot/STATUS"));
+  // Played again, these would speak of publishers that are gone.
+  EXPECT_FALSE(numbers.contains("robot/HEARTBEAT"));
+  EXPECT_FALSE(numbers.contains("robot/REPAIR"));
+}
+
+TEST_F(RecorderTest, HasWhatWasSentBeforeItCame) {
+  MemoryBus bus(MakeSettings(""));
+  const auto poses = bus.AddContext("tracker").Advertise<PoseEstimate>(kPoseChannel);
+  for (int i = 0; i < 10; ++i) poses.Publish({.frame = {i}});
+  bus.RunUntilQuiet();
+  bus.Start<RecorderStage>("recorder");
+  bus.RunUntilQuiet();
+  bus.Kill("recorder");
+  EXPECT_EQ(ReadNumbers()["POSE"], Counted(10));
+}
+
+TEST_F(RecorderTest, APathThatCantBeWrittenIsRefused) {
+  Settings settings = MakeSettings("");
+  settings.Override("recorder.path=" + folder_ + "/none/run.lcmlog");
+  MemoryBus bus(settings);
+  EXPECT_THROW(bus.Start<RecorderStage>("recorder"), InputError);
+}
+
+}  // namespace
+}  // namespace tessera

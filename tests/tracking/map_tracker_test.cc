@@ -1,0 +1,108 @@
+#include "tracking/map_tracker.h"
+
+#include <gtest/gtest.h>
+
+#include "mapping/mapper.h"
+#include "support/synthetic_world.h"
+#include "tracking/delta_schedule.h"
+
+namespace tessera {
+namespace {
+
+struct Outcome {
+  std::vector<PoseEstimate> poses;
+  std::string map_sha256;
+  int num_keyframes = 0;
+  Mapper mapper{MapperOptions{}};
+};
+
+// Tracker and mapper together over frames of the world, but for those in `dropped`; deltas in logical time.
+void Follow(SyntheticWorld world, int64_t num_frames, int64_t delay_frames, const std::vector<int64_t>& dropped,
+            Outcome& outcome) {
+  MapTracker tracker{MapTrackerOptions{}};
+  DeltaSchedule schedule(delay_frames);
+  for (int64_t step = 0; step < num_frames; ++step) {
+    const FeatureFrame features = world.Take(step).features;
+    if (std::find(dropped.begin(), dropped.end(), step) != dropped.end()) continue;
+    ASSERT_TRUE(schedule.CanTrack(features.frame));
+    for (const auto& delta : schedule.Take(features.frame)) ASSERT_EQ(tracker.ApplyDelta(*delta), "");
+    const MapTrackingResult result = tracker.Track(features);
+    outcome.poses.push_back(result.pose);
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      schedule.KeyframeSent(keyframe.id, features.frame);
+      schedule.Receive(std::make_shared<const MapDelta>(outcome.mapper.Process(keyframe)));
+      ++outcome.num_keyframes;
+    }
+  }
+  outcome.map_sha256 = outcome.mapper.map().Sha256Hex();
+}
+
+// The final place of a frame, in the world of the first.
+Rigid3 FinalPose(const Outcome& outcome, const PoseEstimate& pose) {
+  const auto reference = outcome.mapper.removed_keyframes().Find(outcome.mapper.map(), pose.reference_keyframe);
+  return (reference.value_or(Sim3{}) * pose.reference_from_camera).Pose();
+}
+
+TEST(MapTracker, FollowsAStereoDrive) {
+  const SyntheticWorld world(SensorType::kStereo, 0.3);
+  Outcome outcome;
+  Follow(world, 40, 3, {}, outcome);
+  for (const PoseEstimate& pose : outcome.poses) {
+    ASSERT_EQ(pose.state, TrackingState::kTracked) << pose.frame.value;
+    const Rigid3 truth = world.Pose(0.0).Inverse() * world.Pose(static_cast<double>(pose.frame.value));
+    EXPECT_LT((FinalPose(outcome, pose).translation - truth.translation).norm(), 0.05) << pose.frame.value;
+  }
+  EXPECT_GT(outcome.num_keyframes, 3);
+}
+
+TEST(MapTracker, FollowsAMonoDriveUpToScale) {
+  const SyntheticWorld world(SensorType::kMono, 0.3);
+  Outcome outcome;
+  Follow(world, 40, 3, {}, outcome);
+  std::vector<double> scales;
+  for (const PoseEstimate& pose : outcome.poses) {
+    if (pose.state == TrackingState::kInitializing && pose.frame.value < 10) continue;
+    ASSERT_EQ(pose.state, TrackingState::kTracked) << pose.frame.value;
+    const Rigid3 truth = world.Pose(0.0).Inverse() * world.Pose(static_cast<double>(pose.frame.value));
+    const Eigen::Vector3d estimate = FinalPose(outcome, pose).translation;
+    EXPECT_GT(estimate.normalized().dot(truth.translation.normalized()), 0.999);
+    scales.push_back(estimate.norm() / truth.translation.norm());
+  }
+  ASSERT_GT(scales.size(), 29U);
+  EXPECT_NEAR(scales.back() / scales[scales.size() / 2], 1.0, 0.05);
+}
+
+TEST(MapTracker, SameFramesGiveTheSameMapAndDroppedOnesDoNotStopIt) {
+  const SyntheticWorld world(SensorType::kStereo, 0.3);
+  Outcome first, second, dropped;
+  Follow(world, 20, 2, {}, first);
+  Follow(world, 20, 2, {}, second);
+  EXPECT_EQ(first.map_sha256, second.map_sha256);
+  Follow(world, 20, 2, {4, 9, 10}, dropped);
+  for (const PoseEstimate& pose : dropped.poses) EXPECT_EQ(pose.state, TrackingState::kTracked) << pose.frame.value;
+}
+
+TEST(MapTracker, FindsItselfAgainAfterBlindFrames) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  Mapper mapper{MapperOptions{}};
+  std::vector<TrackingState> states;
+  for (int64_t step = 0; step < 12; ++step) {
+    FeatureFrame features = world.Take(step).features;
+    if (step == 6 || step == 7) {
+      features.keypoints.clear();
+      features.descriptors.clear();
+    }
+    const MapTrackingResult result = tracker.Track(features);
+    states.push_back(result.pose.state);
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      ASSERT_EQ(tracker.ApplyDelta(mapper.Process(keyframe)), "");
+    }
+  }
+  EXPECT_EQ(states[7], TrackingState::kLost);
+  EXPECT_EQ(states[8], TrackingState::kTracked);
+  EXPECT_EQ(states[11], TrackingState::kTracked);
+}
+
+}  // namespace
+}  // namespace tessera

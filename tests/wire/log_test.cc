@@ -1,0 +1,223 @@
+// Logs: written by a bus, read back; cut, damaged, mixed up, or not logs at all.
+#include "wire/log.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "core/errors.h"
+#include "runtime/file_bus.h"
+#include "support/example_values.h"
+#include "wire/log_file.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kNumFrames = 5;
+
+struct Event {
+  int64_t time_us = 0;
+  std::string channel;
+  Bytes data;
+};
+
+class LogTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              (std::string("tessera_log_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+
+  template <class Value>
+  void Add(const Channel& channel, const Value& value, const std::string& publisher = "camera") {
+    MessageHeader header{.publisher = publisher, .epoch_us = 1000, .sequence = next_[publisher + channel.name]};
+    for (Bytes& message : EncodeValue(value, header, 30000)) {
+      events_.push_back({time_us_, channel.name, std::move(message)});
+      ++next_[publisher + channel.name];
+    }
+  }
+  // What a camera sends.
+  void AddRecording() {
+    std::mt19937 generator(1);
+    calibration_ = DrawValue<CameraCalibration>(generator, 1);
+    Add(kCalibrationChannel, calibration_);
+    for (int i = 0; i < kNumFrames; ++i) {
+      CameraFrame frame = DrawValue<CameraFrame>(generator, 1);
+      frame.id = {i};
+      frame.utime_us = time_us_ = 50'000 * i;
+      GroundTruthPose truth = DrawValue<GroundTruthPose>(generator, 1);
+      truth.frame = frame.id;
+      Add(kGroundTruthChannel, truth);
+      Add(kCameraChannel, frame);
+      frames_.push_back(frame);
+    }
+    Add(kEndOfStreamChannel, EndOfStream{.stage = "camera", .num_frames = kNumFrames});
+    Add(kEndOfStreamChannel, EndOfStream{.stage = "dispatcher", .num_frames = kNumFrames}, "dispatcher");
+  }
+  std::string Write() {
+    LogFileWriter writer(Path("log"));
+    for (const Event& event : events_) writer.Write(event.time_us, event.channel, event.data);
+    writer.Close();
+    return Path("log");
+  }
+  void ExpectWhole(const std::string& path) {
+    LogReader reader(path);
+    EXPECT_EQ(reader.num_frames(), kNumFrames);
+    std::vector<CameraFrame> frames;
+    int num_truths = 0;
+    int num_calibrations = 0;
+    std::vector<EndOfStream> ends;
+    while (const auto value = reader.Next()) {
+      if (const auto* frame = std::get_if<CameraFrame>(&*value)) frames.push_back(*frame);
+      if (const auto* end = std::get_if<EndOfStream>(&*value)) ends.push_back(*end);
+      if (const auto* calibration = std::get_if<CameraCalibration>(&*value)) {
+        EXPECT_EQ(*calibration, calibration_);
+        EXPECT_TRUE(frames.empty());
+        ++num_calibrations;
+      }
+      num_truths += std::holds_alternative<GroundTruthPose>(*value) ? 1 : 0;
+    }
+    EXPECT_EQ(frames, frames_);
+    EXPECT_EQ(num_truths, kNumFrames);
+    EXPECT_EQ(num_calibrations, 1);
+    ASSERT_EQ(ends.size(), 1U);
+    EXPECT_EQ(ends[0].stage, "camera");
+  }
+  // The sentence with which the log is refused; empty if it is not.
+  static std::string Refusal(const std::string& path) {
+    try {
+      LogReader reader(path);
+      while (reader.Next()) continue;
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::filesystem::path folder_;
+  std::vector<Event> events_;
+  std::map<std::string, int64_t> next_;
+  int64_t time_us_ = 0;
+  CameraCalibration calibration_;
+  std::vector<CameraFrame> frames_;
+};
+
+TEST_F(LogTest, GivesBackWhatWasWritten) {
+  AddRecording();
+  ExpectWhole(Write());
+}
+
+TEST_F(LogTest, PutsRightWhatWasRecordedTwiceOrOutOfOrder) {
+  AddRecording();
+  std::mt19937 generator(2);
+  for (size_t i = 0; i + 1 < events_.size(); ++i) {
+    if (generator() % 4 == 0) std::swap(events_[i], events_[i + 1]);
+  }
+  const size_t num_events = events_.size();
+  for (size_t i = 0; i < num_events; i += 3) events_.push_back(events_[i]);
+  LogReader reader(Write());
+  std::vector<CameraFrame> frames;
+  while (const auto value = reader.Next()) {
+    if (const auto* frame = std::get_if<CameraFrame>(&*value)) frames.push_back(*frame);
+  }
+  EXPECT_EQ(frames, frames_);
+}
+
+TEST_F(LogTest, WithoutAnEndItIsWholeAllTheSame) {
+  AddRecording();
+  events_.resize(events_.size() - 2);
+  EXPECT_EQ(Refusal(Write()), "");
+}
+
+TEST_F(LogTest, CutAnywhereIsRefusedWithItsName) {
+  AddRecording();
+  const std::string path = Write();
+  const auto size = std::filesystem::file_size(path);
+  std::mt19937 generator(3);
+  for (int i = 0; i < 30; ++i) {
+    std::filesystem::copy_file(path, Path("cut"), std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::resize_file(Path("cut"), generator() % (size - 400));
+    EXPECT_NE(Refusal(Path("cut")).find(Path("cut")), std::string::npos);
+  }
+}
+
+TEST_F(LogTest, MissingMessagesAreFound) {
+  AddRecording();
+  const auto camera = [](const Event& event) { return event.channel == "CAMERA"; };
+  events_.erase(std::find_if(events_.begin() + 12, events_.end(), camera));
+  EXPECT_NE(Refusal(Write()).find("lacks"), std::string::npos);
+}
+
+TEST_F(LogTest, WhatIsNoLogIsRefused) {
+  EXPECT_NE(Refusal(Path("nothing")).find("does not exist"), std::string::npos);
+  EXPECT_NE(Refusal(folder_.string()).find("not a file"), std::string::npos);
+  std::ofstream(Path("text")) << "This is a text.\n";
+  EXPECT_NE(Refusal(Path("text")).find("not an LCM log"), std::string::npos);
+  std::ofstream(Path("empty")) << "";
+  EXPECT_NE(Refusal(Path("empty")).find("not an LCM log"), std::string::npos);
+  Add(kEndOfStreamChannel, EndOfStream{.stage = "camera"});
+  EXPECT_NE(Refusal(Write()).find("CAMERA"), std::string::npos);
+}
+
+TEST_F(LogTest, DamagedBytesNeverCrash) {
+  AddRecording();
+  const std::string path = Write();
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  std::mt19937 generator(4);
+  for (int i = 0; i < 200; ++i) {
+    std::string damaged = bytes;
+    for (int k = 0; k < 3; ++k) damaged[generator() % damaged.size()] = static_cast<char>(generator());
+    std::ofstream(Path("damaged"), std::ios::binary) << damaged;
+    (void)Refusal(Path("damaged"));
+  }
+}
+
+TEST_F(LogTest, TwoRecordingsInOneAreRefused) {
+  AddRecording();
+  Add(kCameraChannel, frames_[0], "other_camera");
+  EXPECT_NE(Refusal(Write()).find("2 recordings"), std::string::npos);
+}
+
+TEST_F(LogTest, HasNoNameUntilItIsWhole) {
+  {
+    LogFileWriter writer(Path("log"));
+    writer.Write(1, "CAMERA", Bytes(10));
+    EXPECT_FALSE(std::filesystem::exists(Path("log")));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+  EXPECT_THROW(LogFileWriter(Path("no_such_folder/log")), InputError);
+}
+
+// The events of a log that a bus writes carry the times of the frames, so that it is played at its true pace.
+TEST_F(LogTest, ABusWritesTheSourcesTimes) {
+  const auto bus = OpenBus("file://" + Path("log") + "?mode=w", 0);
+  EXPECT_FALSE(bus->can_listen());
+  bus->Publish("CALIBRATION", Bytes(3), std::nullopt);
+  bus->Publish("CAMERA", Bytes(5), 7'000'000);
+  bus->Publish("GROUND_TRUTH", Bytes(4), std::nullopt);
+  bus->Publish("CAMERA", Bytes(5), 7'100'000);
+  bus->Publish("CAMERA", Bytes(5), 6'000'000);
+  bus->Close();
+  LogFileReader reader(Path("log"));
+  LogEvent event;
+  std::vector<std::pair<std::string, int64_t>> times;
+  while (reader.Next(&event)) times.emplace_back(event.channel, event.time_us);
+  EXPECT_EQ(times, (std::vector<std::pair<std::string, int64_t>>{{"CALIBRATION", 7'000'000},
+                                                                 {"CAMERA", 7'000'000},
+                                                                 {"GROUND_TRUTH", 7'000'000},
+                                                                 {"CAMERA", 7'100'000},
+                                                                 {"CAMERA", 7'100'000}}));
+}
+
+}  // namespace
+}  // namespace tessera
