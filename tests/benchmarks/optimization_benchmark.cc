@@ -13,9 +13,7 @@
 
 #include "optimization/bundle_adjustment.h"
 #include "optimization/pose_graph.h"
-#include "support/synthetic_bundle.h"
-#include "support/synthetic_circuit.h"
-#include "support/synthetic_street.h"
+#include "support/synthetic_problems.h"
 
 namespace tessera {
 namespace {

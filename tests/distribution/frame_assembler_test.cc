@@ -8,7 +8,7 @@
 #include "features/extractor.h"
 #include "features/selection.h"
 #include "features/tiling.h"
-#include "support/synthetic_image.h"
+#include "support/synthetic_images.h"
 
 namespace tessera {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "support/synthetic_image.h"
+#include "support/synthetic_images.h"
 
 namespace tessera {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "mapping/map_bending.h"
-#include "support/planted_map.h"
+#include "support/synthetic_world.h"
 
 namespace tessera {
 namespace {

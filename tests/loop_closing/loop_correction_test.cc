@@ -10,7 +10,7 @@
 #include "map/map_editor.h"
 #include "map/spanning_tree.h"
 #include "mapping/map_bending.h"
-#include "support/synthetic_circuit.h"
+#include "support/synthetic_problems.h"
 
 namespace tessera {
 namespace {

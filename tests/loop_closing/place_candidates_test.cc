@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "map/map_editor.h"
-#include "support/small_maps.h"
+#include "support/map_changes.h"
 
 namespace tessera {
 namespace {

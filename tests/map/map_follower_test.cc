@@ -7,7 +7,7 @@
 
 #include "map/map_archive.h"
 #include "map/removed_keyframes.h"
-#include "support/random_changes.h"
+#include "support/map_changes.h"
 
 namespace tessera {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "support/random_changes.h"
+#include "support/map_changes.h"
 
 namespace tessera {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "map/map_editor.h"
-#include "support/small_maps.h"
+#include "support/map_changes.h"
 
 namespace tessera {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "support/small_maps.h"
+#include "support/map_changes.h"
 
 namespace tessera {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "map/spanning_tree.h"
 #include "optimization/global_adjustment.h"
-#include "support/planted_map.h"
+#include "support/synthetic_world.h"
 
 namespace tessera {
 namespace {

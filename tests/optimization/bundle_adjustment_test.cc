@@ -8,8 +8,7 @@
 #include <limits>
 #include <numeric>
 
-#include "support/synthetic_bundle.h"
-#include "support/synthetic_street.h"
+#include "support/synthetic_problems.h"
 
 namespace tessera {
 namespace {

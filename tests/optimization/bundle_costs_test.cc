@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "support/synthetic_bundle.h"
+#include "support/synthetic_problems.h"
 
 namespace tessera {
 namespace {

@@ -7,8 +7,7 @@
 #include <limits>
 
 #include "optimization/pose_graph_costs.h"
-#include "support/synthetic_bundle.h"
-#include "support/synthetic_circuit.h"
+#include "support/synthetic_problems.h"
 
 namespace tessera {
 namespace {

@@ -5,8 +5,7 @@
 #include "optimization/bundle_adjustment.h"
 #include "optimization/pose_graph.h"
 #include "support/other_process.h"
-#include "support/synthetic_circuit.h"
-#include "support/synthetic_street.h"
+#include "support/synthetic_problems.h"
 
 namespace tessera {
 namespace {

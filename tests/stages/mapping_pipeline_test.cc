@@ -17,8 +17,8 @@
 #include "stages/mapper/mapper_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
 #include "stages/tracker/tracker_stage.h"
-#include "support/moving_scene.h"
 #include "support/run_folder.h"
+#include "support/synthetic_images.h"
 
 namespace tessera {
 namespace {

@@ -17,7 +17,7 @@
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
-#include "support/synthetic_image.h"
+#include "support/synthetic_images.h"
 
 namespace tessera {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "core/errors.h"
 #include "messages/channels.h"
-#include "support/random_changes.h"
+#include "support/map_changes.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
 
