@@ -12,7 +12,7 @@
 namespace tessera {
 
 struct TrainingViewOptions {
-  int64_t every = 10;            // of a source, every so many frames: neighbours show the same
+  int64_t every = 10;            // of a source, every so many frames: neighbors show the same
   int num_views = 4;             // of a photo: all of it, and parts of it as if seen from nearer
   std::string calibration_path;  // of the sources that need one (SourceOptions)
   uint64_t seed = 1;             // of the choice of parts

@@ -91,7 +91,7 @@ void AddTrainingOptions(CLI::App& train, Arguments& arguments) {
   train.add_option("--children", arguments.vocabulary.num_children, "into which each node is split");
   train.add_option("--levels", arguments.vocabulary.num_levels, "of the tree below its root");
   train.add_option("--direct-level", arguments.vocabulary.direct_level, "of the direct index");
-  train.add_option("--seed", arguments.vocabulary.seed, "of the choice of first centres, and of views");
+  train.add_option("--seed", arguments.vocabulary.seed, "of the choice of first centers, and of views");
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ std::string CameraRig::Check(SensorType sensor) const {
     return problem;
   }
   if (sensor == SensorType::kRgbd && !(depth_unit_m > 0.0 && std::isfinite(depth_unit_m))) {
-    return "the depth unit (metres per count) must be given and positive";
+    return "the depth unit (meters per count) must be given and positive";
   }
   if (sensor != SensorType::kStereo) {
     return "";
@@ -41,7 +41,7 @@ std::string CameraRig::Check(SensorType sensor) const {
     return "left and right images must be of one size";
   }
   if (!(right_from_left.translation.norm() > 0.0)) {
-    return "the cameras of the pair must not stand in the same place";
+    return "the cameras of the pair must not have the same position";
   }
   return "";
 }

@@ -33,8 +33,8 @@ struct PinholeCamera {
 struct CameraRig {
   PinholeCamera left;
   std::optional<PinholeCamera> right;  // stereo
-  Rigid3 right_from_left;              // stereo: metres
-  double depth_unit_m = 0.0;           // RGB-D: metres per count; 0: unknown
+  Rigid3 right_from_left;              // stereo: meters
+  double depth_unit_m = 0.0;           // RGB-D: meters per count; 0: unknown
 
   // Empty if all is well for this kind of sensor, else what is missing or out of range.
   std::string Check(SensorType sensor) const;

@@ -93,7 +93,7 @@ std::map<int64_t, std::string> ReadImageTable(const fs::path& camera_folder) {
     const std::string name = row.fields.size() > 1 ? row.fields[1] : row.fields[0] + ".png";
     const std::string path = FindImage(camera_folder / "data" / name);
     if (path.empty()) {
-      throw InputError(row.place + " names " + (camera_folder / "data" / name).string() +
+      throw InputError(row.location + " names " + (camera_folder / "data" / name).string() +
                        ", which does not exist: copy the sequence again");
     }
     images.emplace(time_ns, path);
@@ -107,7 +107,7 @@ PoseTrack ReadBodyTrack(const fs::path& path) {
   for (const TextRow& row : ReadRows(path)) {
     const Eigen::Quaterniond rotation(row.Number(4), row.Number(5), row.Number(6), row.Number(7));
     if (std::abs(rotation.norm() - 1.0) > 0.1) {
-      throw InputError(row.place + ": fields 5 to 8 are not a unit quaternion w x y z: repair the file");
+      throw InputError(row.location + ": fields 5 to 8 are not a unit quaternion w x y z: repair the file");
     }
     world_from_body.Add(row.Integer(0),
                         {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});

@@ -19,7 +19,7 @@ struct SourceOptions {
   std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME
   SensorType sensor = SensorType::kMono;  // mono takes the left images of a pair
   std::string calibration_path;           // YAML (calibration_file.h), instead of the source's own; empty: its own
-  double depth_unit_m = 0.0;              // RGB-D: metres per count, instead of what the source says; 0: as it says
+  double depth_unit_m = 0.0;              // RGB-D: meters per count, instead of what the source says; 0: as it says
   int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
   int64_t last_frame = -1;                // -1: to the end
 };

@@ -1,5 +1,5 @@
 // Image files of data sets, in any format that OpenCV reads, checked for completeness: OpenCV itself fills
-// the missing part of a truncated JPEG or PNG with grey and says nothing.
+// the missing part of a truncated JPEG or PNG with gray and says nothing.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// The intensities of an image file; colour is converted by the decoder's integer arithmetic.
+// The intensities of an image file; color is converted by the decoder's integer arithmetic.
 // Throws InputError if the file is missing, truncated or not an image.
 GrayImage ReadGrayImage(const std::string& path);
 

@@ -1,4 +1,4 @@
-// KITTI odometry sequences: image_0/ and image_1/ (rectified grey pair) or one video each, calib.txt,
+// KITTI odometry sequences: image_0/ and image_1/ (rectified gray pair) or one video each, calib.txt,
 // times.txt, and ground truth in poses.txt or ../../poses/<sequence>.txt (pose of camera 0, 3x4 row by row).
 #include <algorithm>
 #include <array>
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 using Projection = std::array<double, 12>;  // 3x4, row by row
 
-// Number of the camera of a row labelled `P0:`, `P0`, `P_rect_00:` and so on; -1 for any other label.
+// Number of the camera of a row labeled `P0:`, `P0`, `P_rect_00:` and so on; -1 for any other label.
 int CameraOfLabel(std::string label) {
   if (label.ends_with(':')) label.pop_back();
   for (const std::string prefix : {"P_rect_0", "P"}) {
@@ -32,12 +32,12 @@ int CameraOfLabel(std::string label) {
 // The projection matrices of calib.txt by camera. Rows without a label are cameras 0, 1, ...
 std::map<int, Projection> ReadProjections(const std::string& path) {
   std::map<int, Projection> projections;
-  int num_unlabelled = 0;
+  int num_unlabeled = 0;
   for (TextRow& row : ReadRows(path)) {
     double number = 0.0;
     int camera = -1;
     if (ParseNumber(row.fields.front(), number)) {
-      camera = num_unlabelled++;
+      camera = num_unlabeled++;
     } else {
       camera = CameraOfLabel(row.fields.front());
       row.fields.erase(row.fields.begin());
@@ -46,7 +46,7 @@ std::map<int, Projection> ReadProjections(const std::string& path) {
       continue;  // Tr, R_rect, dates: of other sensors
     }
     if (row.fields.size() != 12) {
-      throw InputError(row.place + ": P" + std::to_string(camera) + " has " + std::to_string(row.fields.size()) +
+      throw InputError(row.location + ": P" + std::to_string(camera) + " has " + std::to_string(row.fields.size()) +
                        " numbers instead of the 12 of a 3x4 projection matrix: repair the file");
     }
     for (size_t i = 0; i < 12; ++i) {
@@ -168,7 +168,7 @@ void ReadPoses(const std::string& folder, Recording& recording) {
     }
     const Eigen::Matrix3d rotation = matrix.leftCols<3>();
     if (!IsRotation(rotation)) {
-      throw InputError(rows[i].place + ": the 3x4 matrix does not begin with a rotation: repair the file");
+      throw InputError(rows[i].location + ": the 3x4 matrix does not begin with a rotation: repair the file");
     }
     recording.ground_truth.push_back(
         {FrameId{static_cast<int64_t>(i)}, recording.utimes_us[i], Rigid3::FromMatrix(rotation, matrix.col(3))});

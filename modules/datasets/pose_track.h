@@ -14,8 +14,8 @@ class PoseTrack {
   // Of several poses at one time the first one counts.
   void Add(int64_t time_ns, const Rigid3& pose) { poses_.emplace(time_ns, pose); }
 
-  // The pose at a time: linear between its neighbours in translation, slerp in rotation. nullopt outside the
-  // track and where the neighbours are more than kMaxGapNs apart.
+  // The pose at a time: linear between its neighbors in translation, slerp in rotation. nullopt outside the
+  // track and where the neighbors are more than kMaxGapNs apart.
   std::optional<Rigid3> At(int64_t time_ns) const;
 
   // Motion capture and survey instruments give 100 poses a second or more; over a longer gap a straight line

@@ -33,13 +33,13 @@ std::optional<PinholeCamera> PinholeFromText(const std::string& text) {
 
 double DepthUnitFromText(const std::string& text) {
   static const std::regex kFactor(R"(\bfactor\s*[=:]?\s*([0-9]+(?:\.[0-9]+)?))", std::regex::icase);
-  static const std::regex kMillimetres(R"(\bmillimet(?:re|er)s?\b)", std::regex::icase);
+  static const std::regex kMillimeters(R"(\bmillimet(?:re|er)s?\b)", std::regex::icase);
   std::smatch match;
   if (std::regex_search(text, match, kFactor)) {
     const double counts_per_m = std::stod(match[1]);
     return counts_per_m > 0.0 ? 1.0 / counts_per_m : 0.0;
   }
-  return std::regex_search(text, kMillimetres) ? 1e-3 : 0.0;
+  return std::regex_search(text, kMillimeters) ? 1e-3 : 0.0;
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// The calibration that the README of a data set tells people, for formats that have no place for one.
+// The calibration that the README of a data set tells people, for formats without one.
 #pragma once
 
 #include <optional>
@@ -12,8 +12,8 @@ namespace tessera {
 // at its end, and the first mention of a key counts. nullopt unless all four are there and make sense.
 std::optional<PinholeCamera> PinholeFromText(const std::string& text);
 
-// Metres per count of depth images, from `factor N` (counts per metre; the first mention) or else the word
-// millimetres. 0: the text doesn't say.
+// Meters per count of depth images, from `factor N` (counts per meter; the first mention) or else the word
+// millimeters. 0: the text doesn't say.
 double DepthUnitFromText(const std::string& text);
 
 }  // namespace tessera

@@ -20,7 +20,7 @@ class ImageReader {
   virtual int64_t num_images() const = 0;
   // Throws InputError if the image is missing or damaged.
   virtual GrayImage Read(int64_t index) = 0;
-  // Its file, and its place there if the file holds several; for messages.
+  // Its file, and its index there if the file holds several; for messages.
   virtual std::string Name(int64_t index) const = 0;
 };
 

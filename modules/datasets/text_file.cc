@@ -35,12 +35,12 @@ bool ParseNumber(const std::string& text, double& number) {
 
 double TextRow::Number(size_t index) const {
   if (index >= fields.size()) {
-    throw InputError(place + " has " + std::to_string(fields.size()) + " fields, but at least " +
+    throw InputError(location + " has " + std::to_string(fields.size()) + " fields, but at least " +
                      std::to_string(index + 1) + " are needed: repair the file");
   }
   double number = 0.0;
   if (!ParseNumber(fields[index], number)) {
-    throw InputError(place + ": field " + std::to_string(index + 1) + ", `" + fields[index] +
+    throw InputError(location + ": field " + std::to_string(index + 1) + ", `" + fields[index] +
                      "`, is not a number: repair the file");
   }
   return number;
@@ -52,7 +52,7 @@ int64_t TextRow::Integer(size_t index) const {
   int64_t number = 0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || stop != text.data() + text.size()) {
-    throw InputError(place + ": field " + std::to_string(index + 1) + ", `" + text +
+    throw InputError(location + ": field " + std::to_string(index + 1) + ", `" + text +
                      "`, is not a whole number: repair the file");
   }
   return number;

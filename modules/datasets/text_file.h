@@ -9,7 +9,7 @@ namespace tessera {
 
 // One line that is neither blank nor a comment (#), cut into fields at blanks, tabs and commas.
 struct TextRow {
-  std::string place;  // "FILE line 17", for messages
+  std::string location;  // "FILE line 17", for messages
   std::vector<std::string> fields;
 
   // Field `index` as a finite number. Throws InputError if it isn't one or the row is too short.

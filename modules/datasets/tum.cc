@@ -1,9 +1,9 @@
 // TUM RGB-D sequences: rgb.txt and depth.txt (`time file`), groundtruth.txt (`time tx ty tz qx qy qz qw`, of
-// the colour camera), times in seconds.
+// the color camera), times in seconds.
 //
-// The format has no place for a calibration. It is taken from the first of: --camera; calibration.yaml or
+// The format holds no calibration. It is taken from the first of: --camera; calibration.yaml or
 // camera.yaml in the folder; the folder's README where it says `fx=... fy=... cx=... cy=...` and `factor N`
-// (counts per metre) or millimetres; the values that the TUM tools take for any Kinect.
+// (counts per meter) or millimeters; the values that the TUM tools take for any Kinect.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kMaxPairGapUs = 20'000;  // as in the TUM tools: colour and depth are not triggered together
+constexpr int64_t kMaxPairGapUs = 20'000;  // as in the TUM tools: color and depth are not triggered together
 
 struct TimedFile {
   int64_t utime_us = 0;
@@ -34,11 +34,11 @@ std::vector<TimedFile> ReadFileTable(const fs::path& folder, const std::string& 
   for (const TextRow& row : ReadRows(folder / table)) {
     const int64_t utime_us = MicrosecondsFromSeconds(row.Number(0));
     if (row.fields.size() < 2) {
-      throw InputError(row.place + " must hold `time file`: repair the file");
+      throw InputError(row.location + " must hold `time file`: repair the file");
     }
     const std::string path = FindImage(folder / row.fields[1]);
     if (path.empty()) {
-      throw InputError(row.place + " names " + (folder / row.fields[1]).string() +
+      throw InputError(row.location + " names " + (folder / row.fields[1]).string() +
                        ", which does not exist: copy the sequence again");
     }
     files.push_back({utime_us, path});
@@ -92,11 +92,11 @@ void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording)
   }
   if (paths.empty()) {
     throw InputError("folder " + folder.string() +
-                     ": no colour image has a depth image within 20 ms: check rgb.txt and depth.txt");
+                     ": no color image has a depth image within 20 ms: check rgb.txt and depth.txt");
   }
   if (paths.size() < color.size()) {
     recording.notes.push_back(std::to_string(color.size() - paths.size()) +
-                              " colour images without a depth image within 20 ms are skipped.");
+                              " color images without a depth image within 20 ms are skipped.");
   }
   recording.left = ReadImageFiles(std::move(paths));
 }
@@ -162,7 +162,7 @@ void ReadGroundTruth(const fs::path& path, Recording& recording) {
   for (const TextRow& row : ReadRows(path)) {
     const Eigen::Quaterniond rotation(row.Number(7), row.Number(4), row.Number(5), row.Number(6));
     if (std::abs(rotation.norm() - 1.0) > 0.1) {
-      throw InputError(row.place + ": fields 5 to 8 are not a unit quaternion x y z w: repair the file");
+      throw InputError(row.location + ": fields 5 to 8 are not a unit quaternion x y z w: repair the file");
     }
     track.Add(1000 * MicrosecondsFromSeconds(row.Number(0)),
               {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});

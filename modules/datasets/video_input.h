@@ -1,4 +1,4 @@
-// Grey images out of video files, V4L2 devices and network streams.
+// Gray images out of video files, V4L2 devices and network streams.
 #pragma once
 
 #include <memory>

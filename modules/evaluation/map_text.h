@@ -7,7 +7,7 @@
 
 namespace tessera {
 
-// PLY, ASCII: a vertex per landmark, in the order of ids. x y z: metres (mono: units of the map) in the world frame;
+// PLY, ASCII: a vertex per landmark, in the order of ids. x y z: meters (mono: units of the map) in the world frame;
 // nx ny nz: mean direction to the cameras that saw it; observations: how many keyframes see it.
 std::string PlyText(const Map& map);
 

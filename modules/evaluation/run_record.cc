@@ -69,7 +69,7 @@ FrameCounts RunRecord::Counts() const {
     } else {
       ++counts.lost;
     }
-    // One whose place was asked for and found within the same frame was lost all the same.
+    // One that was relocalized within the same frame was lost all the same.
     const bool is_lost = state == TrackingState::kLost || pose.estimate.is_relocalized;
     if (is_lost && before == TrackingState::kTracked) {
       ++counts.tracking_failures;

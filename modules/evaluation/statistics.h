@@ -17,7 +17,7 @@ struct Statistics {
   double max = 0.0;
 };
 
-// Quantile q of n sorted values stands at (n - 1) q, interpolated linearly between its neighbours.
+// Quantile q of n sorted values stands at (n - 1) q, interpolated linearly between its neighbors.
 // nullopt if there are no values.
 std::optional<Statistics> Summarize(std::vector<double> values);
 

@@ -44,7 +44,7 @@ LoopResult LoopCloser::FindLoop(KeyframeId id) const {
     result.num_matched += steps.is_matched ? 1 : 0;
     result.num_aligned += steps.is_aligned ? 1 : 0;
     if (!place) continue;
-    result.corrections = CorrectMap(map_, id, *place, options_.correction);
+    result.corrections = ComputeCorrections(map_, id, *place, options_.correction);
     if (result.corrections.empty()) continue;
     result.matched = place->matched;
     result.matched_from_current = place->matched_from_current;

@@ -1,5 +1,5 @@
-// The loop closer's steps: a keyframe in, whether it sees a place seen before; an image of a lost camera in, where it
-// was taken. No bus, no clock.
+// The loop closer's steps: whether a keyframe shows an earlier place, and where an image of a lost camera was taken. No
+// bus, no clock.
 #pragma once
 
 #include <map>
@@ -27,8 +27,8 @@ struct LoopCloserOptions {
   std::string Check() const;
 };
 
-// Answers are pure functions of the map and the question: one that is started again, and gets the map as it was, gives
-// the same ones.
+// Answers are pure functions of the map and the request: a loop closer that is restarted and gets the same map gives
+// the same answers.
 class LoopCloser {
  public:
   // Throws std::invalid_argument with Check()'s sentence.
@@ -37,9 +37,9 @@ class LoopCloser {
   // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
   [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
 
-  // Whether keyframe `id` sees an earlier place, in the map as it is now. "No loop" if it is no longer there.
+  // Whether keyframe `id` shows an earlier place, in the present map. "No loop" if it is no longer there.
   LoopResult FindLoop(KeyframeId id) const;
-  // Where the image was taken, in the map as it is now.
+  // Where the image was taken, in the present map.
   RelocalizationAnswer Relocalize(const RelocalizationRequest& request) const;
 
   const Map& map() const { return map_; }

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-Sim3 Place(const Map& map, KeyframeId id) { return Sim3::From(map.FindKeyframe(id)->world_from_camera); }
+Sim3 PoseOf(const Map& map, KeyframeId id) { return Sim3::From(map.FindKeyframe(id)->world_from_camera); }
 
 // Pairs of keyframes of the part that an edge joins, the older one first.
 std::set<std::pair<KeyframeId, KeyframeId>> EssentialPairs(const Map& map, const std::map<KeyframeId, int>& node_of,
@@ -35,7 +35,7 @@ std::set<std::pair<KeyframeId, KeyframeId>> EssentialPairs(const Map& map, const
 // The part that began later moves: C = world_from_matched * matched_from_current * current_from_world, or its inverse.
 std::vector<LoopResult::Correction> JoinParts(const Map& map, KeyframeId current, const VerifiedPlace& place) {
   const Sim3 matched_world_from_current_world =
-      Place(map, place.matched) * place.matched_from_current * Place(map, current).Inverse();
+      PoseOf(map, place.matched) * place.matched_from_current * PoseOf(map, current).Inverse();
   const bool moves_current = RootOf(map, current) > RootOf(map, place.matched);
   const Sim3 new_from_old =
       moves_current ? matched_world_from_current_world : matched_world_from_current_world.Inverse();
@@ -61,10 +61,10 @@ PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const V
   std::map<KeyframeId, int> node_of;
   for (const KeyframeId id : PartOf(map, current)) {
     node_of[id] = static_cast<int>(problem.nodes.size());
-    problem.nodes.push_back({id, Place(map, id), id == root});
+    problem.nodes.push_back({id, PoseOf(map, id), id == root});
   }
   for (const auto& [older, newer] : EssentialPairs(map, node_of, options.min_shared_landmarks)) {
-    problem.edges.push_back({node_of[newer], node_of[older], Place(map, older).Inverse() * Place(map, newer), 1.0,
+    problem.edges.push_back({node_of[newer], node_of[older], PoseOf(map, older).Inverse() * PoseOf(map, newer), 1.0,
                              MedianDepth(map, *map.FindKeyframe(newer))});
   }
   problem.edges.push_back({node_of[current], node_of[place.matched], place.matched_from_current, options.loop_weight,
@@ -72,8 +72,8 @@ PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const V
   return problem;
 }
 
-std::vector<LoopResult::Correction> CorrectMap(const Map& map, KeyframeId current, const VerifiedPlace& place,
-                                               const CorrectionOptions& options) {
+std::vector<LoopResult::Correction> ComputeCorrections(const Map& map, KeyframeId current, const VerifiedPlace& place,
+                                                       const CorrectionOptions& options) {
   if (RootOf(map, current) != RootOf(map, place.matched)) return JoinParts(map, current, place);
   const PoseGraphProblem problem = BuildEssentialGraph(map, current, place, options);
   const std::optional<std::vector<Sim3>> solved = OptimizePoseGraph(problem, options.graph);

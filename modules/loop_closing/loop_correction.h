@@ -1,4 +1,4 @@
-// How the map must bend so that a place seen twice is one.
+// The correction of the map that a loop asks for: the pose of every keyframe, so that both visits of a place agree.
 #pragma once
 
 #include <string>
@@ -20,15 +20,15 @@ struct CorrectionOptions {
   std::string Check() const;
 };
 
-// The keyframes of one part of the map in the essential graph: the spanning tree, pairs that share many landmarks, the
-// loops closed before, and the new one. All keep their present relative poses but the new loop, which has the measured
-// one. The root stays. R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 2015.
+// The essential graph of one part of the map: the spanning tree, pairs that share many landmarks, the
+// loops closed before, and the new one. Edges measure the present relative poses, but the new loop the verified one.
+// The root is fixed. R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 2015.
 PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const VerifiedPlace& place,
                                      const CorrectionOptions& options);
 
-// Where both keyframes belong to one part of the map, the essential graph optimised; where they don't, the part that
-// began later moves to the other as a whole. By id. Empty: no solution.
-std::vector<LoopResult::Correction> CorrectMap(const Map& map, KeyframeId current, const VerifiedPlace& place,
-                                               const CorrectionOptions& options);
+// Corrections by keyframe id. If both keyframes belong to one part of the map, they follow from the optimized essential
+// graph; if they don't, the part that began later moves to the other as a whole. Empty: no solution.
+std::vector<LoopResult::Correction> ComputeCorrections(const Map& map, KeyframeId current, const VerifiedPlace& place,
+                                                       const CorrectionOptions& options);
 
 }  // namespace tessera

@@ -15,7 +15,7 @@ struct Group {
   KeyframeId best;     // of them
 };
 
-// Neighbouring keyframes look alike, so their scores are added: a place that only one image of speaks for is weak. Best
+// Neighboring keyframes look alike, so their scores are added: a place of which only one image matches is weak. Best
 // group first, each named by its best keyframe (of equals, which a camera that stands still makes, the oldest); groups
 // with the same best keyframe are one.
 std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::Place>& found,
@@ -26,7 +26,7 @@ std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::P
   for (const PlaceDatabase::Place& place : found) {
     Group group{0.0, place.id};
     double best_score = place.score;
-    for (const KeyframeId id : KeyframesAround(map, place.id, options.num_neighbours)) {
+    for (const KeyframeId id : KeyframesAround(map, place.id, options.num_neighbors)) {
       const auto member = score_of.find(id);
       if (member == score_of.end()) continue;
       group.score += member->second;
@@ -46,24 +46,24 @@ std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::P
   return groups;
 }
 
-// The keyframe, its neighbours and theirs.
+// The keyframe, its neighbors and theirs.
 std::set<KeyframeId> Connected(const Map& map, KeyframeId id, int min_shared) {
   std::set<KeyframeId> connected{id};
   const auto num_all = static_cast<int>(map.keyframes().size());
-  for (const KeyframeId neighbour : map.Covisible(id, num_all, min_shared)) {
-    connected.insert(neighbour);
-    for (const KeyframeId second : map.Covisible(neighbour, num_all, min_shared)) connected.insert(second);
+  for (const KeyframeId neighbor : map.Covisible(id, num_all, min_shared)) {
+    connected.insert(neighbor);
+    for (const KeyframeId second : map.Covisible(neighbor, num_all, min_shared)) connected.insert(second);
   }
   return connected;
 }
 
-// The least that any neighbour looks like the keyframe.
-double LowestNeighbourScore(const Map& map, const PlaceDatabase& places, KeyframeId id,
-                            const CandidateOptions& options) {
+// The lowest similarity of a neighbor with the keyframe.
+double LowestNeighborScore(const Map& map, const PlaceDatabase& places, KeyframeId id,
+                           const CandidateOptions& options) {
   const BagOfWords* bag = places.Find(id);
   double lowest = 1.0;
-  for (const KeyframeId neighbour : map.Covisible(id, options.num_neighbours, options.min_shared_landmarks)) {
-    if (const BagOfWords* other = places.Find(neighbour)) lowest = std::min(lowest, Similarity(*bag, *other));
+  for (const KeyframeId neighbor : map.Covisible(id, options.num_neighbors, options.min_shared_landmarks)) {
+    if (const BagOfWords* other = places.Find(neighbor)) lowest = std::min(lowest, Similarity(*bag, *other));
   }
   return lowest;
 }
@@ -75,27 +75,41 @@ std::vector<Group> FindGroups(const Map& map, const PlaceDatabase& places, Keyfr
   const std::set<KeyframeId> connected = Connected(map, id, options.min_shared_landmarks);
   std::vector<PlaceDatabase::Place> found =
       places.Query(*bag, [&](KeyframeId other) { return other < id && !connected.contains(other); });
-  const double min_score = LowestNeighbourScore(map, places, id, options);
+  const double min_score = LowestNeighborScore(map, places, id, options);
   std::erase_if(found, [&](const PlaceDatabase::Place& place) { return place.score < min_score; });
   if (found.empty()) return {};
   return RankGroups(map, found, options);
 }
 
-// The keyframes made just before `id` that are neighbours of it.
-std::vector<KeyframeId> Witnesses(const Map& map, KeyframeId id, const CandidateOptions& options) {
-  std::vector<KeyframeId> witnesses =
+// The newest of the neighbors of `id` that are older than it.
+std::vector<KeyframeId> PreviousNeighbors(const Map& map, KeyframeId id, const CandidateOptions& options) {
+  std::vector<KeyframeId> previous =
       map.Covisible(id, static_cast<int>(map.keyframes().size()), options.min_shared_landmarks);
-  std::erase_if(witnesses, [&](KeyframeId other) { return other > id; });
-  std::sort(witnesses.begin(), witnesses.end(), std::greater<>());
-  witnesses.resize(std::min(witnesses.size(), static_cast<size_t>(options.num_witnesses)));
-  return witnesses;
+  std::erase_if(previous, [&](KeyframeId other) { return other > id; });
+  std::sort(previous.begin(), previous.end(), std::greater<>());
+  previous.resize(std::min(previous.size(), static_cast<size_t>(options.num_consistent)));
+  return previous;
+}
+
+// By keyframe: all keyframes of its candidate places.
+std::vector<std::set<KeyframeId>> PlacesOf(const Map& map, const PlaceDatabase& places,
+                                           const std::vector<KeyframeId>& keyframes, const CandidateOptions& options) {
+  std::vector<std::set<KeyframeId>> places_of;
+  for (const KeyframeId id : keyframes) {
+    std::set<KeyframeId>& members = places_of.emplace_back();
+    for (const Group& group : FindGroups(map, places, id, options)) {
+      const std::vector<KeyframeId> place = KeyframesAround(map, group.best, options.num_neighbors);
+      members.insert(place.begin(), place.end());
+    }
+  }
+  return places_of;
 }
 
 }  // namespace
 
 std::string CandidateOptions::Check() const {
-  if (min_shared_landmarks < 1 || num_neighbours < 1 || num_witnesses < 0 || max_candidates < 1) {
-    return "the loop closer's numbers of neighbours and candidates must be positive";
+  if (min_shared_landmarks < 1 || num_neighbors < 1 || num_consistent < 0 || max_candidates < 1) {
+    return "the numbers of neighbors and candidates must be positive";
   }
   return "";
 }
@@ -106,22 +120,16 @@ Candidates FindLoopCandidates(const Map& map, const PlaceDatabase& places, Keyfr
   const std::vector<Group> groups = FindGroups(map, places, id, options);
   candidates.num_found = static_cast<int>(groups.size());
   if (groups.empty()) return candidates;
-  const std::vector<KeyframeId> witnesses = Witnesses(map, id, options);
-  if (static_cast<int>(witnesses.size()) < options.num_witnesses) return candidates;
-  std::vector<std::set<KeyframeId>> seen_by;  // each witness's places
-  for (const KeyframeId witness : witnesses) {
-    std::set<KeyframeId>& seen = seen_by.emplace_back();
-    for (const Group& group : FindGroups(map, places, witness, options)) {
-      const std::vector<KeyframeId> place = KeyframesAround(map, group.best, options.num_neighbours);
-      seen.insert(place.begin(), place.end());
-    }
-  }
+  const std::vector<KeyframeId> previous = PreviousNeighbors(map, id, options);
+  if (static_cast<int>(previous.size()) < options.num_consistent) return candidates;
+  const std::vector<std::set<KeyframeId>> previous_places = PlacesOf(map, places, previous, options);
   for (const Group& group : groups) {
-    const std::vector<KeyframeId> place = KeyframesAround(map, group.best, options.num_neighbours);
-    const bool is_confirmed = std::all_of(seen_by.begin(), seen_by.end(), [&](const std::set<KeyframeId>& seen) {
-      return std::any_of(place.begin(), place.end(), [&](KeyframeId member) { return seen.contains(member); });
-    });
-    if (is_confirmed && static_cast<int>(candidates.keyframes.size()) < options.max_candidates) {
+    const std::vector<KeyframeId> place = KeyframesAround(map, group.best, options.num_neighbors);
+    const auto meets = [&](const std::set<KeyframeId>& members) {
+      return std::any_of(place.begin(), place.end(), [&](KeyframeId member) { return members.contains(member); });
+    };
+    if (std::all_of(previous_places.begin(), previous_places.end(), meets) &&
+        static_cast<int>(candidates.keyframes.size()) < options.max_candidates) {
       candidates.keyframes.push_back(group.best);
     }
   }

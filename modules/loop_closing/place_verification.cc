@@ -12,7 +12,7 @@ namespace {
 
 size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
 
-// A keypoint of the matched keyframe (first) and one of the current (second), whose landmarks are taken for one point.
+// A keypoint of the matched keyframe (first) and one of the current (second), whose landmarks should be the same point.
 PointPair MakePair(const Map& map, const Keyframe& matched, const Keyframe& current, const KeypointPair& pair) {
   const auto seen = [&](const Keyframe& keyframe, int32_t keypoint, Eigen::Vector3d* point, PixelObservation* pixel) {
     const Landmark& landmark = *map.FindLandmark(keyframe.landmarks[Index(keypoint)]);
@@ -38,9 +38,10 @@ std::vector<KeypointPair> MatchLandmarks(const PlaceDatabase& places, KeyframeId
                      options);
 }
 
-// What the current keyframe sees of the place and knows under another name, as far as the matched keyframe sees it too.
-std::vector<PointPair> PairsOf(const Map& map, const TrackedFrame& frame, const Keyframe& matched,
-                               const Keyframe& current) {
+// Points that guided matching found in the current keyframe, where that has a landmark of its own for them and the
+// matched keyframe observes them too.
+std::vector<PointPair> DuplicatePairs(const Map& map, const TrackedFrame& frame, const Keyframe& matched,
+                                      const Keyframe& current) {
   std::map<LandmarkId, int32_t> keypoint_of;
   for (size_t i = 0; i < matched.landmarks.size(); ++i) {
     if (matched.landmarks[i].valid()) keypoint_of[matched.landmarks[i]] = static_cast<int32_t>(i);
@@ -64,26 +65,26 @@ SimilarityOptions SimilarityFor(const CameraCalibration& camera, SimilarityOptio
 }  // namespace
 
 std::string VerificationOptions::Check() const {
-  if (min_matches < 3 || min_seen < 6 || num_neighbours < 1) {
-    return "the loop closer must ask for at least 3 matches and 6 landmarks seen";
+  if (min_matches < 3 || min_seen < 6 || num_neighbors < 1) {
+    return "verification needs at least 3 matches and 6 observed landmarks";
   }
-  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "the loop closer's min_coverage must lie between 0 and 1";
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage must be between 0 and 1";
   for (const std::string& sentence : {similarity.Check(), guided.Check()}) {
     if (!sentence.empty()) return sentence;
   }
   return "";
 }
 
-PlacedPoints LandmarksAround(const Map& map, KeyframeId center, int num_neighbours) {
+PlacedPoints LandmarksAround(const Map& map, KeyframeId center, int num_neighbors) {
   PlacedPoints points;
-  for (const LandmarkId id : LandmarksSeenBy(map, KeyframesAround(map, center, num_neighbours))) {
+  for (const LandmarkId id : LandmarksSeenBy(map, KeyframesAround(map, center, num_neighbors))) {
     points.emplace_back(PointId{id, {}, -1}, *map.FindLandmark(id));
   }
   return points;
 }
 
-int PlaceAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
-               TrackedFrame& frame) {
+int LocalizeAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
+                  TrackedFrame& frame) {
   frame.points.assign(frame.points.size(), {});
   MatchLocal(points, matching.local_radius_px, matching, frame);
   return OptimizeFrame(pose, frame);
@@ -135,12 +136,12 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
   if (!aligned) return std::nullopt;
 
   TrackedFrame frame(std::make_shared<const FrameView>(*current.features, options.sigma_px, kRgbdBaseline));
-  const PlacedPoints landmarks = LandmarksAround(map, candidate, options.num_neighbours);
+  const PlacedPoints landmarks = LandmarksAround(map, candidate, options.num_neighbors);
   frame.world_from_camera = (Sim3::From(matched.world_from_camera) * aligned->first_from_second).Pose();
-  if (PlaceAmong(landmarks, options.guided, {}, frame) < options.min_seen) return std::nullopt;
+  if (LocalizeAmong(landmarks, options.guided, {}, frame) < options.min_seen) return std::nullopt;
   if (Coverage(landmarks, frame) < options.min_coverage) return std::nullopt;
   const SimilarityEstimate refined =
-      RefineSimilarity(camera, PairsOf(map, frame, matched, current), aligned->first_from_second, similarity);
+      RefineSimilarity(camera, DuplicatePairs(map, frame, matched, current), aligned->first_from_second, similarity);
   if (refined.num_inliers < similarity.min_inliers) return std::nullopt;
 
   VerifiedPlace place{candidate, {}, {}};

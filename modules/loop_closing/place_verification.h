@@ -1,4 +1,4 @@
-// Whether an earlier place really is what a keyframe sees, and where the keyframe then stands.
+// Place verification: whether a keyframe really shows an earlier place, and from where.
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@ namespace tessera {
 
 struct VerificationOptions {
   BagMatchingOptions matching;
-  int min_matches = 20;          // landmarks that both keyframes see, by their descriptors
+  int min_matches = 20;          // landmarks that both keyframes observe, matched by their descriptors
   SimilarityOptions similarity;  // has_scale and baseline_m follow from the camera
-  // Then the place's landmarks are looked for around where the keyframe should see them.
-  int num_neighbours = 15;  // of the place, whose landmarks belong to it
+  // Guided matching: the place's landmarks are searched around their projections.
+  int num_neighbors = 15;  // keyframes around the candidate, whose landmarks belong to the place
   MatchOptions guided{.local_radius_px = 6.0, .max_hamming = 64};
-  int min_seen = 45;          // of the place's landmarks that the keyframe must see
+  int min_seen = 45;          // landmarks of the place that the keyframe must observe
   double min_coverage = 0.4;  // see Coverage(): true places have 0.75 and more, the same car elsewhere up to 0.25
   double sigma_px = kKeypointSigmaPx;
 
@@ -34,34 +34,34 @@ struct VerificationOptions {
 struct VerifiedPlace {
   KeyframeId matched;
   Sim3 matched_from_current;       // scale 1 but for mono
-  std::vector<SeenLandmark> seen;  // landmarks of the place that the current keyframe sees, by keypoint
+  std::vector<SeenLandmark> seen;  // landmarks of the place that the current keyframe observes, by keypoint
 };
 
-// How far a candidate came.
+// The steps that a candidate passed.
 struct VerificationSteps {
   bool is_matched = false;
   bool is_aligned = false;
 };
 
-// The similarity between the two keyframes comes from landmarks that both see (Sim(3) for mono, SE(3) otherwise); then
-// all landmarks of the place are projected into the current keyframe, whose pose must agree with min_seen of them, all
-// over the image. Rotation and translation are those of that pose, the scale is the similarity's. nullopt if a step
-// fails.
+// The similarity between the two keyframes is estimated from landmarks that both observe (Sim(3) for mono, SE(3)
+// otherwise); then all landmarks of the place are projected into the current keyframe, whose pose must agree with
+// min_seen of them, spread over the image. Rotation and translation are those of that pose, the scale is the
+// similarity's. nullopt if a step fails.
 std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& places, KeyframeId current,
                                          KeyframeId candidate, const VerificationOptions& options,
                                          VerificationSteps* steps);
 
-// The landmarks that the keyframe and its neighbours see, by id.
-PlacedPoints LandmarksAround(const Map& map, KeyframeId id, int num_neighbours);
+// The landmarks that the keyframe and its neighbors observe, by id.
+PlacedPoints LandmarksAround(const Map& map, KeyframeId id, int num_neighbors);
 
-// Looks for the points from where `frame` stands, and moves it to where it agrees with most of them. Points that do not
-// agree are taken off. Returns how many are left.
-int PlaceAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
-               TrackedFrame& frame);
+// Guided matching of the points from the pose of `frame`, then pose optimization with the matches found; outliers are
+// removed. Returns the number of matches left.
+int LocalizeAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
+                  TrackedFrame& frame);
 
-// Of the parts of the image in which the frame, from where it stands, should see several of the points: the share in
-// which it sees one. A thing that is found in two places, such as a parked car of the same make, agrees with a pose as
-// well as a place does; but what stands around the thing is not seen then.
+// The share of image cells with a match (1/16 of the width each), of those cells in which the frame, at its pose,
+// should see several of the points. An object found in two places, such as a parked car of the same make, agrees with a
+// pose as well as a place does; but what is around the object is not seen then.
 double Coverage(const PlacedPoints& points, const TrackedFrame& frame);
 
 }  // namespace tessera

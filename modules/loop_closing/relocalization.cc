@@ -11,7 +11,7 @@ namespace {
 
 size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
 
-// Where the camera stood, by the landmarks that keyframe `id` sees too.
+// The pose of the camera in the world from the landmarks of one keyframe.
 std::optional<Rigid3> RoughPose(const Keyframe& keyframe, const BagOfWords& keyframe_bag, const Map& map,
                                 const FrameView& view, const BagOfWords& bag, const RelocalizationOptions& options) {
   const FeatureFrame& features = view.features();
@@ -34,10 +34,10 @@ std::optional<Rigid3> RoughPose(const Keyframe& keyframe, const BagOfWords& keyf
 }  // namespace
 
 std::string RelocalizationOptions::Check() const {
-  if (min_matches < 4 || min_seen < 6 || num_neighbours < 1) {
-    return "a lost camera needs at least 4 matches and 6 landmarks seen to be found again";
+  if (min_matches < 4 || min_seen < 6 || num_neighbors < 1) {
+    return "relocalization needs at least 4 matches and 6 observed landmarks";
   }
-  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage of relocalisation must lie between 0 and 1";
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage must be between 0 and 1";
   return guided.Check();
 }
 
@@ -56,8 +56,8 @@ RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, con
     if (!pose) continue;
     TrackedFrame frame(view);
     frame.world_from_camera = *pose;
-    const PlacedPoints landmarks = LandmarksAround(map, id, options.num_neighbours);
-    if (PlaceAmong(landmarks, options.guided, {}, frame) < options.min_seen) continue;
+    const PlacedPoints landmarks = LandmarksAround(map, id, options.num_neighbors);
+    if (LocalizeAmong(landmarks, options.guided, {}, frame) < options.min_seen) continue;
     if (Coverage(landmarks, frame) < options.min_coverage) continue;
     answer.reference = id;
     answer.reference_from_camera = (keyframe.WorldFromKeyframe().Inverse() * frame.world_from_camera).Pose();

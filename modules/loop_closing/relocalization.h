@@ -1,4 +1,4 @@
-// Where an image was taken, with nothing to go by but the map.
+// Relocalization: where an image was taken, from the map alone.
 #pragma once
 
 #include <string>
@@ -18,20 +18,19 @@ struct RelocalizationOptions {
   BagMatchingOptions matching{.max_hamming = 60};
   int min_matches = 15;  // of the image's keypoints with landmarks of a keyframe
   AbsolutePoseOptions pose;
-  int num_neighbours = 15;  // of the place, whose landmarks are then looked for
+  int num_neighbors = 15;  // keyframes around the candidate, whose landmarks are searched
   MatchOptions guided{.local_radius_px = 8.0};
-  int min_seen = 50;          // of the place's landmarks that the image must show
-  double min_coverage = 0.4;  // and its share of the image, see Coverage()
+  int min_seen = 50;          // landmarks of the place that the image must show
+  double min_coverage = 0.4;  // see Coverage()
   double sigma_px = kKeypointSigmaPx;
 
   // Empty if all is well, else one sentence.
   std::string Check() const;
 };
 
-// Asks the places that look alike one after the other: matches by the vocabulary's words, the pose of three points
-// (RANSAC, seeded by the frame's number), then all landmarks of the place around that pose, which must agree with
-// min_seen of them, all over the image. The first place that does is the answer. As in ORB-SLAM (Mur-Artal et al.
-// 2015).
+// Tries the candidates one after the other: matches by visual words, the pose from three points (RANSAC, seeded by the
+// frame's number), then guided matching of all landmarks of the place; the pose must agree with min_seen of them,
+// spread over the image. The first place that passes is the answer. As in ORB-SLAM (Mur-Artal et al. 2015).
 RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, const Vocabulary& vocabulary,
                                 const RelocalizationRequest& request, const CandidateOptions& candidates,
                                 const RelocalizationOptions& options);

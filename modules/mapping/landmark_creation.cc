@@ -131,12 +131,12 @@ std::optional<int32_t> PairSearch::BestOnLine(int32_t keypoint, const PixelObser
     if (second_.landmarks[Index(candidate)].valid() || std::abs(int{to.level} - int{from.level}) > 2) return;
     const Eigen::Vector2d offset = Eigen::Vector2d(to.x_px, to.y_px) - a;
     const double limit = limits_px_[std::min<size_t>(to.level, kMaxLevels - 1)];
-    const double place = unit.dot(offset), aside = unit.x() * offset.y() - unit.y() * offset.x();
-    if (std::abs(aside) > limit || place < -limit || place > length + limit) return;
+    const double along_px = unit.dot(offset), aside_px = unit.x() * offset.y() - unit.y() * offset.x();
+    if (std::abs(aside_px) > limit || along_px < -limit || along_px > length + limit) return;
     if (!AreAnglesNear(from.angle, to.angle, roll_)) return;
     const int distance = HammingDistance(descriptor, second_.features->descriptors[Index(candidate)]);
     const Eigen::Vector2d to_px(to.x_px, to.y_px);
-    // The same corner found on another level is no rival.
+    // The same corner found on another level is not a second candidate.
     const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
     if (distance < best_distance) {
       if (is_elsewhere && best >= 0) second_distance = best_distance;
@@ -188,9 +188,10 @@ bool PairSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const Pixel
 }  // namespace
 
 std::string CreationOptions::Check() const {
-  if (max_neighbours < 1) return "mapper.creation_neighbours must be at least 1";
-  if (!(min_parallax_rad > 0.0) || !(min_baseline_share > 0.0)) return "the mapper's least parallax must be positive";
-  if (max_hamming < 1 || max_hamming > 256) return "the mapper's max_hamming must be between 1 and 256";
+  if (max_neighbors < 1) return "new landmarks need at least one neighbor to be searched";
+  if (!(min_parallax_rad > 0.0) || !(min_baseline_share > 0.0))
+    return "the least parallax and baseline of new landmarks must be positive";
+  if (max_hamming < 1 || max_hamming > 256) return "the Hamming distance of new landmarks must be between 1 and 256";
   return "";
 }
 
@@ -230,7 +231,7 @@ std::vector<LandmarkId> CreateFromPairs(KeyframeId id, const CreationOptions& op
   const double camera_baseline_m = Baseline(keyframe.features->calibration);
   const double min_baseline = camera_baseline_m > 0.0 ? camera_baseline_m : options.min_baseline_share * median_depth;
 
-  for (const KeyframeId other_id : map.Covisible(id, options.max_neighbours)) {
+  for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
     const Keyframe& other = *map.FindKeyframe(other_id);
     const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
     if (baseline < min_baseline) continue;

@@ -1,4 +1,4 @@
-// New landmarks from a new keyframe: from the depth of its keypoints, and from keypoints that two keyframes share.
+// Landmark creation at a new keyframe: from the depth of its keypoints, and by triangulation with other keyframes.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@
 namespace tessera {
 
 struct CreationOptions {
-  int max_neighbours = 10;  // keyframes searched for a second view, those that share most landmarks first
+  int max_neighbors = 10;  // keyframes searched for a second view, most shared landmarks first
   // 1.4 degrees. Depths from less come out too far, by (noise / parallax)^2, and in a sharp turn, where each generation
   // of points is placed by the one before, that adds up: 10 % of scale in KITTI 03's turn at 1 degree, 7 % at 2
   // degrees. But few points on a straight road reach 2 degrees in time.
   double min_parallax_rad = 0.025;
-  double min_baseline_share = 0.01;  // mono: a neighbour must be this part of the median depth away
+  double min_baseline_share = 0.01;  // mono: a neighbor must be this part of the median depth away
   int max_hamming = 50;              // bits of 256: what patches of one point differ by, nearly always
   double max_hamming_ratio = 0.85;   // best match to the second best along the line, elsewhere on it
   double max_depth_baselines =
@@ -25,11 +25,11 @@ struct CreationOptions {
   std::string Check() const;
 };
 
-// Landmarks from single keypoints of `keyframe` with depth that see none yet. Returns the new ones.
+// Creates landmarks from keypoints of `keyframe` that have depth and observe no landmark yet. Returns them.
 std::vector<LandmarkId> CreateFromDepth(KeyframeId keyframe, const CreationOptions& options, MapEditor& editor);
 
-// Landmarks from pairs of keypoints that see none yet, one in `keyframe` and one in a covisible keyframe near the
-// first's epipolar line there: the line's part that depths from a third of the nearest landmarks' to infinity allow.
+// Creates landmarks from pairs of keypoints that observe none yet, one in `keyframe` and one in a covisible keyframe
+// near the first's epipolar line there: the segment for depths from a third of the nearest landmarks' to infinity.
 // A pair must agree in descriptor, orientation and level, and its point must have parallax, lie in front of both,
 // project to both keypoints (chi-square), and have distances that fit the levels. Returns the new ones.
 std::vector<LandmarkId> CreateFromPairs(KeyframeId keyframe, const CreationOptions& options, MapEditor& editor);

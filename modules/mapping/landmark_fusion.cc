@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// The keyframe's keypoint that shows the landmark best; -1: none does.
+// The keyframe's keypoint that matches the landmark best; -1: none does.
 int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const View& view, const Landmark& landmark,
                      const FusionOptions& options) {
   const std::optional<ExpectedView> expected = Expect(view, landmark);
@@ -59,7 +59,7 @@ void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, co
 }
 
 // In the order of its keypoints.
-std::vector<LandmarkId> SeenLandmarks(const Keyframe& keyframe) {
+std::vector<LandmarkId> ObservedLandmarks(const Keyframe& keyframe) {
   std::vector<LandmarkId> landmarks;
   for (const LandmarkId id : keyframe.landmarks) {
     if (id.valid()) landmarks.push_back(id);
@@ -75,26 +75,26 @@ void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<Lan
 }
 
 std::string FusionOptions::Check() const {
-  if (max_neighbours < 1 || max_second_neighbours < 0) return "mapper.fusion_neighbours must be at least 1";
-  if (!(radius_px > 0.0) || max_hamming < 1) return "the mapper's search for duplicates needs a positive radius";
+  if (max_neighbors < 1 || max_second_neighbors < 0) return "landmarks must be fused with at least one neighbor";
+  if (!(radius_px > 0.0) || max_hamming < 1)
+    return "the search for duplicate landmarks needs a positive radius and Hamming distance";
   return "";
 }
 
 void FuseLandmarks(KeyframeId id, const FusionOptions& options, MapEditor& editor) {
   const Map& map = editor.map();
   std::set<KeyframeId> targets;
-  for (const KeyframeId neighbour : map.Covisible(id, options.max_neighbours)) {
-    targets.insert(neighbour);
-    for (const KeyframeId second : map.Covisible(neighbour, options.max_second_neighbours)) {
+  for (const KeyframeId neighbor : map.Covisible(id, options.max_neighbors)) {
+    targets.insert(neighbor);
+    for (const KeyframeId second : map.Covisible(neighbor, options.max_second_neighbors)) {
       targets.insert(second);
     }
   }
   targets.erase(id);
 
-  const std::vector<LandmarkId> own = SeenLandmarks(*map.FindKeyframe(id));
-  ProjectLandmarks(targets, own, options, editor);
-  const std::vector<KeyframeId> seers(targets.begin(), targets.end());
-  ProjectInto(id, LandmarksSeenBy(map, seers), options, editor);
+  ProjectLandmarks(targets, ObservedLandmarks(*map.FindKeyframe(id)), options, editor);
+  const std::vector<KeyframeId> observers(targets.begin(), targets.end());
+  ProjectInto(id, LandmarksSeenBy(map, observers), options, editor);
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Landmarks that are one and the same point, found by projecting them into the keyframes around.
+// Fusion of duplicate landmarks: those of one and the same point, found by projecting them into the keyframes around.
 #pragma once
 
 #include <set>
@@ -10,21 +10,21 @@
 namespace tessera {
 
 struct FusionOptions {
-  int max_neighbours = 10;        // keyframes that share most landmarks with the new one
-  int max_second_neighbours = 5;  // of each of those, the ones that share most with it
-  double radius_px = 3.0;         // of the search, at level 0; times the scale of the level
-  int max_hamming = 50;           // bits of 256
+  int max_neighbors = 10;        // keyframes that share most landmarks with the new one
+  int max_second_neighbors = 5;  // of each of those, the ones that share most with it
+  double radius_px = 3.0;        // of the search, at level 0; times the scale of the level
+  int max_hamming = 50;          // bits of 256
 
   // Empty if all is well, else one sentence.
   std::string Check() const;
 };
 
-// Projects the landmarks of `keyframe` into its neighbours, and theirs into it. Where a keypoint agrees with the
-// projection (chi-square, level, descriptor), the landmark is observed there; if the keypoint sees another landmark
-// already, the two are merged into the one with more observations (ties: the older).
+// Projects the landmarks of `keyframe` into its neighbors, and theirs into it. Where a keypoint agrees with the
+// projection (chi-square, level, descriptor), it becomes an observation of the landmark; if it observes another one
+// already, the two are merged into the one with more observations (if equal, the older).
 void FuseLandmarks(KeyframeId keyframe, const FusionOptions& options, MapEditor& editor);
 
-// Projects `landmarks` into each of `targets` in the same way: a place seen again holds its landmarks twice.
+// Projects `landmarks` into each of `targets` in the same way; for a revisited place, which has its landmarks twice.
 void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<LandmarkId>& landmarks,
                       const FusionOptions& options, MapEditor& editor);
 

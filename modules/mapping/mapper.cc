@@ -13,10 +13,10 @@ namespace tessera {
 namespace {
 
 bool CanObserve(const Map& map, KeyframeId keyframe, int32_t keypoint, LandmarkId landmark) {
-  const Keyframe* seeing = map.FindKeyframe(keyframe);
-  if (seeing == nullptr || map.FindLandmark(landmark) == nullptr || keypoint < 0 ||
-      static_cast<size_t>(keypoint) >= seeing->landmarks.size() ||
-      seeing->landmarks[static_cast<size_t>(keypoint)].valid()) {
+  const Keyframe* observer = map.FindKeyframe(keyframe);
+  if (observer == nullptr || map.FindLandmark(landmark) == nullptr || keypoint < 0 ||
+      static_cast<size_t>(keypoint) >= observer->landmarks.size() ||
+      observer->landmarks[static_cast<size_t>(keypoint)].valid()) {
     return false;
   }
   return !map.IsSeenBy(landmark, keyframe);
@@ -30,17 +30,18 @@ void ChooseParent(KeyframeId id, MapEditor& editor) {
   }
 }
 
-// Whether the observations left still fix the landmark: two of them, or one with a depth.
-bool IsFixed(const Map& map, LandmarkId id) {
+// Whether the remaining observations determine the position: two of them, or one with depth.
+bool IsDetermined(const Map& map, LandmarkId id) {
   const std::vector<Observation>& observations = map.ObservationsOf(id);
   if (observations.size() != 1) return observations.size() > 1;
   return SeenAt(*map.FindKeyframe(observations[0].keyframe)->features, observations[0].keypoint).has_right();
 }
 
+// Descriptors, normals and distances follow from observations and poses; landmarks that are no longer determined go.
 void RefreshDescriptions(MapEditor& editor) {
   const std::vector<LandmarkId> touched(editor.touched_landmarks().begin(), editor.touched_landmarks().end());
   for (const LandmarkId id : touched) {
-    if (!IsFixed(editor.map(), id)) {
+    if (!IsDetermined(editor.map(), id)) {
       editor.RemoveLandmark(id);
     } else {
       editor.ChangeLandmark(
@@ -52,8 +53,8 @@ void RefreshDescriptions(MapEditor& editor) {
 }  // namespace
 
 std::string MapperOptions::Check() const {
-  for (const std::string& sentence :
-       {creation.Check(), fusion.Check(), window.Check(), bundle.Check(), culling.Check()}) {
+  for (const std::string& sentence : {creation.Check(), fusion.Check(), window.Check(), bundle.Check(),
+                                      landmark_culling.Check(), keyframe_culling.Check()}) {
     if (!sentence.empty()) return sentence;
   }
   return "";
@@ -65,17 +66,17 @@ Mapper::Mapper(const MapperOptions& options) : options_(options) {
 
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
-  Bend(due, seen.id, editor);
+  ApplyDue(due, seen.id, editor);
   Insert(seen, editor);
   ObserveLandmarks(seen, editor);
   ObserveShared(seen, editor);
   ChooseParent(seen.id, editor);
-  trial_.Judge(seen.id, options_.culling, editor);
+  recent_landmarks_.Cull(seen.id, options_.landmark_culling, editor);
   const std::vector<LandmarkId> from_pairs = CreateLandmarks(seen.id, editor);
   FuseLandmarks(seen.id, options_.fusion, editor);
-  RemoveUnconfirmed(seen.id, from_pairs, options_.culling, editor);
+  RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
   AdjustLocally(seen.id, options_.window, options_.bundle, editor);
-  CullKeyframes(seen.id, options_.culling, removed_, editor);
+  CullKeyframes(seen.id, options_.keyframe_culling, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
   delta.asks_adjustment = AskForAdjustment(seen.id);
@@ -85,47 +86,55 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
 std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
   MapEditor editor(map_);
   const KeyframeId last = map_.answered();
-  const bool is_bent = Bend(due, {last.value + 1}, editor);
-  // What came into the map since the last adjustment began shall share in one, where loops hold the map together.
+  const bool has_moved = ApplyDue(due, {last.value + 1}, editor);
+  // Keyframes that came after the last adjustment was requested take part in another one.
   wants_adjustment_ |= last_asked_.valid() && last_asked_ < last;
-  if (!is_bent && !wants_adjustment_) return std::nullopt;
+  if (!has_moved && !wants_adjustment_) return std::nullopt;
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(last);
   delta.asks_adjustment = AskForAdjustment(last);
   return delta;
 }
 
-// Whether anything moved. A loop found on a map that was bent meanwhile is void, and so is an adjustment; a loop comes
-// first, since it changes more.
-bool Mapper::Bend(const DueCorrections& due, KeyframeId now, MapEditor& editor) {
-  bool is_bent = false;
-  for (const LoopResult& loop : due.loops) {
+// Whether anything moved. Loops come first, since they change more; they outdate the adjustment.
+bool Mapper::ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor) {
+  bool has_moved = ApplyDueLoops(due.loops, now, editor);
+  if (due.adjustment) has_moved |= ApplyDueAdjustment(*due.adjustment, now, editor);
+  return has_moved;
+}
+
+// A loop that was found before the last correction of the map is measured against poses that are gone.
+bool Mapper::ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor) {
+  bool has_moved = false;
+  for (const LoopResult& loop : loops) {
     const bool is_there = map_.FindKeyframe(loop.answers) != nullptr && map_.FindKeyframe(loop.matched) != nullptr;
-    if (!is_there || loop.answers < last_bent_) {
+    if (!is_there || loop.answers < last_corrected_) {
       ++num_void_loops_;
       continue;
     }
     CloseLoop(loop, options_.loop_fusion, editor);
     AdjustLocally(loop.answers, options_.window, options_.bundle, editor);
-    last_bent_ = now;
-    wants_adjustment_ = is_base_bent_ = is_bent = true;
+    last_corrected_ = now;
+    wants_adjustment_ = is_base_outdated_ = has_moved = true;
   }
-  if (due.adjustment) {
-    if (due.adjustment->is_usable && !is_base_bent_) {
-      ApplyAdjustment(*due.adjustment, *base_, editor);
-      last_bent_ = now;
-      is_bent = true;
-    }
-    base_.reset();
+  return has_moved;
+}
+
+bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor) {
+  const bool applies = adjustment.is_usable && !is_base_outdated_;
+  if (applies) {
+    ApplyAdjustment(adjustment, *base_, editor);
+    last_corrected_ = now;
   }
-  return is_bent;
+  base_.reset();
+  return applies;
 }
 
 bool Mapper::AskForAdjustment(KeyframeId now) {
   if (!wants_adjustment_ || base_) return false;
   base_ = TakeBase(map_);
   last_asked_ = now;
-  wants_adjustment_ = is_base_bent_ = false;
+  wants_adjustment_ = is_base_outdated_ = false;
   return true;
 }
 
@@ -153,7 +162,7 @@ void Mapper::ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor
   }
 }
 
-// A keypoint of an earlier keyframe stands for its landmark; where it has none, the point becomes one.
+// Matches with keypoints of earlier keyframes: their landmark is observed, or created where there is none yet.
 void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
   std::vector<LandmarkId> created;
   for (const SharedKeypoint& shared : seen.shared) {
@@ -184,8 +193,8 @@ void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
 
 std::vector<LandmarkId> Mapper::CreateLandmarks(KeyframeId id, MapEditor& editor) {
   std::vector<LandmarkId> from_pairs = CreateFromPairs(id, options_.creation, editor);
-  trial_.Add(id, from_pairs);
-  trial_.Add(id, CreateFromDepth(id, options_.creation, editor));
+  recent_landmarks_.Add(id, from_pairs);
+  recent_landmarks_.Add(id, CreateFromDepth(id, options_.creation, editor));
   return from_pairs;
 }
 

@@ -8,10 +8,11 @@
 #include "map/map.h"
 #include "map/removed_keyframes.h"
 #include "mapping/correction_schedule.h"
-#include "mapping/culling.h"
+#include "mapping/keyframe_culling.h"
 #include "mapping/landmark_creation.h"
+#include "mapping/landmark_culling.h"
 #include "mapping/landmark_fusion.h"
-#include "mapping/map_bending.h"
+#include "mapping/map_correction.h"
 #include "messages/tracking_types.h"
 #include "optimization/bundle_adjustment.h"
 
@@ -23,8 +24,9 @@ struct MapperOptions {
   CreationOptions creation;
   FusionOptions fusion;
   LocalWindowOptions window;
-  BundleOptions bundle{.max_num_iterations = 5};  // a warm start; what is left comes with the next keyframe
-  CullingOptions culling;
+  BundleOptions bundle{.max_num_iterations = 5};  // a warm start; the next keyframe continues
+  LandmarkCullingOptions landmark_culling;
+  KeyframeCullingOptions keyframe_culling;
   LoopFusionOptions loop_fusion;
 
   // Empty if all is well, else one sentence.
@@ -36,41 +38,43 @@ class Mapper {
   // Throws std::invalid_argument with Check()'s sentence.
   explicit Mapper(const MapperOptions& options);
 
-  // Begins with a map made before. To be called first, if at all. Returns Map::Apply's sentence.
+  // Starts with an existing map. To be called first, if at all. Returns Map::Apply's sentence.
   [[nodiscard]] std::string Load(const MapDelta& snapshot) { return map_.Apply(snapshot); }
 
-  // Bends the map as is due, takes the keyframe in and improves the map around it. The delta is a pure function of what
-  // was given so far; it asks for a global adjustment after a loop was closed, if none is on its way. Throws
-  // std::invalid_argument if the id is not new or the lists do not fit the keypoints.
+  // Applies the corrections that are due, inserts the keyframe and improves the map around it. The delta is a pure
+  // function of all input so far; it asks for a global adjustment after a loop was closed, unless one is under way.
+  // Throws std::invalid_argument if the id is not new or the lists do not fit the keypoints.
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
-  // Bends the map as is due when no further keyframe will come; after loops, a last adjustment of all is asked for.
-  // nullopt if nothing changes: then there is nothing more to come.
+  // Applies the corrections that are due when no further keyframe will come, and asks for a last global adjustment
+  // after loops. nullopt if nothing changes: then the map is final.
   std::optional<MapDelta> Finish(const DueCorrections& due);
 
   const Map& map() const { return map_; }
-  // Loops that were found on a map that was bent meanwhile: the next keyframes find them again.
+  // Loops that were ignored since the map was corrected after they were found: the next keyframes find them again.
   int64_t num_void_loops() const { return num_void_loops_; }
-  // Where the culled keyframes stood.
+  // The poses of culled keyframes.
   const RemovedKeyframes& removed_keyframes() const { return removed_; }
 
  private:
-  bool Bend(const DueCorrections& due, KeyframeId now, MapEditor& editor);
+  bool ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor);
+  bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
+  bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor);
   void ObserveShared(const KeyframeObservation& seen, MapEditor& editor);
-  // Returns those that a pair of keyframes made.
+  // Returns those created from pairs of keyframes.
   std::vector<LandmarkId> CreateLandmarks(KeyframeId id, MapEditor& editor);
 
   const MapperOptions options_;
   Map map_;
-  LandmarkTrial trial_;
+  RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;
-  KeyframeId last_bent_;                // the map was bent in the delta that answers it
-  bool wants_adjustment_ = false;       // a loop was closed that no adjustment has taken in yet
-  std::optional<AdjustmentBase> base_;  // of the one under way
-  KeyframeId last_asked_;               // the last delta that asked for an adjustment answers it
-  bool is_base_bent_ = false;           // a loop was closed since: it comes too late
+  KeyframeId last_corrected_;           // the delta that answers it corrected the map
+  bool wants_adjustment_ = false;       // a loop was closed after the last adjustment was requested
+  std::optional<AdjustmentBase> base_;  // of the adjustment under way
+  KeyframeId last_asked_;               // the last delta that requested an adjustment answers it
+  bool is_base_outdated_ = false;       // a loop was closed since: the adjustment is ignored
   int64_t num_void_loops_ = 0;
 };
 

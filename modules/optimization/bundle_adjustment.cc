@@ -70,7 +70,7 @@ std::vector<char> InFront(const BundleProblem& problem) {
   return is_in_front;
 }
 
-// Mono: scales the world about the fixed camera's centre until `scale_pose` is as far from it as it was. No pixel
+// Mono: scales the world about the fixed camera's center until `scale_pose` is as far from it as it was. No pixel
 // moves.
 void RestoreScale(const BundleProblem& problem, BundleResult& result) {
   const auto fixed =

@@ -15,7 +15,7 @@ namespace tessera {
 
 struct BundlePose {
   KeyframeId id;             // for the caller; the solver goes by index
-  Rigid3 camera_from_world;  // metres (mono: units of the map)
+  Rigid3 camera_from_world;  // meters (mono: units of the map)
   bool is_fixed = false;     // held where it is: part of the gauge
 };
 
@@ -30,7 +30,7 @@ struct BundleObservation {
   PixelObservation seen;  // sigma_px: 1.2^level times the keypoint noise of level 0
 };
 
-// What is known of the motion between two keyframes, instead of their common landmarks: the outer window's tie.
+// The known motion between two keyframes, in place of their common landmarks: constraints of the outer window.
 struct RelativePoseConstraint {
   int from = -1;  // indices into BundleProblem::poses
   int to = -1;
@@ -71,7 +71,7 @@ struct BundleOptions {
 };
 
 // For a whole map after a loop was closed (README.md has the measurements): little damping, and steps that gain little
-// are worth taking, since a street may bend by metres for a millionth of the cost.
+// are worth taking: a street may move by meters for a millionth of the cost.
 BundleOptions GlobalBundleOptions();
 
 struct BundleResult {
@@ -84,7 +84,7 @@ struct BundleResult {
   int num_iterations = 0;     // of all rounds
 };
 
-// Minimises over the free camera_from_world and all points, by Levenberg-Marquardt with the points eliminated (Schur):
+// Minimizes over the free camera_from_world and all points, by Levenberg-Marquardt with the points eliminated (Schur):
 // in Ceres, but for local windows (BundleOptions),
 //
 //   1/2 sum_obs rho(|e|^2) + 1/2 sum_constraints r' information r
@@ -97,12 +97,12 @@ struct BundleResult {
 //
 // With poses seen by nobody but constraints this is the double window of H. Strasdat, A. Davison, J. M. M. Montiel,
 // K. Konolige, "Double Window Optimisation for Constant Time Visual SLAM", ICCV 2011: reprojection errors inside,
-// relative poses outside. With two poses it is the first bundle adjustment of mono initialisation (scale_pose = the
+// relative poses outside. With two poses it is the first bundle adjustment of mono initialization (scale_pose = the
 // second).
 //
 // The result is a pure function of the values given; the order of the lists decides its last bits only. Throws
 // std::invalid_argument with Check()'s sentence where problem or options are malformed. nullopt where there is nothing
-// to optimise (no usable observation or constraint on anything free), a value is not finite, or the solver found no
+// to optimize (no usable observation or constraint on anything free), a value is not finite, or the solver found no
 // step.
 std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const BundleOptions& options);
 

@@ -1,11 +1,11 @@
 // The residuals of bundle adjustment as Ceres wants them. Only this module's sources and its tests include this file.
 //
-// A pose is optimised as a tangent (v, w) at the pose where the solve began (MoveBy), so that Ceres sees plain vectors.
-// Corrections are far below half a turn, where this is a chart without seams. Seen from the world a camera's centre
-// moves straight, by v, and w turns the camera where it is. A whole street that bends, cameras and points, is then
-// nearly linear in the parameters, and steps along it can be long; with Retract, where w turns v as well, the first
-// steps after a loop are many times shorter (README.md). What depends on the pose alone is computed once an evaluation
-// (EvaluationCallback), not once an observation.
+// A pose is optimized as a tangent (v, w) at the pose where the solve began (MoveBy), so that Ceres sees plain vectors.
+// Corrections are far below half a turn, where this is a chart without seams. Seen from the world a camera's center
+// moves straight, by v, and w turns the camera where it is. A whole street that is deformed, cameras and points, is
+// then nearly linear in the parameters, and steps along it can be long; with Retract, where w turns v as well, the
+// first steps after a loop are many times shorter (README.md). What depends on the pose alone is computed once an
+// evaluation (EvaluationCallback), not once an observation.
 #pragma once
 
 #include <ceres/evaluation_callback.h>
@@ -23,7 +23,7 @@ namespace tessera {
 
 // A residual behind the camera, in sigmas: constant, so that nothing draws a point there, and finite.
 inline constexpr double kBehindResidual = 100.0;
-// Points with a smaller z (metres, or units of the map) count as behind the camera.
+// Points with a smaller z (meters, or units of the map) count as behind the camera.
 inline constexpr double kMinDepth = 1e-6;
 
 // Trust regions grow no larger: mono's scale has no curvature of its own, only what damping gives, and below a part of

@@ -7,7 +7,7 @@
 
 namespace tessera {
 
-// Optimises the part of the map that holds keyframe `asked`: all its keyframes but the root of its spanning tree, and
+// Optimizes the part of the map that holds keyframe `asked`: all its keyframes but the root of its spanning tree, and
 // all landmarks that two of them see. The result answers `asked` and the map's last delta; it is not usable where the
 // solver found nothing better. Throws std::invalid_argument if there is no such keyframe.
 GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOptions& options);

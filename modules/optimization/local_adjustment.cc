@@ -26,9 +26,9 @@ void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleP
 
 // Index of the keyframe among the poses; -1: not in the window.
 int PoseIndex(const BundleProblem& problem, const std::vector<size_t>& by_id, KeyframeId id) {
-  const auto place = std::lower_bound(by_id.begin(), by_id.end(), id,
+  const auto found = std::lower_bound(by_id.begin(), by_id.end(), id,
                                       [&](size_t index, KeyframeId key) { return problem.poses[index].id < key; });
-  return place != by_id.end() && problem.poses[*place].id == id ? static_cast<int>(*place) : -1;
+  return found != by_id.end() && problem.poses[*found].id == id ? static_cast<int>(*found) : -1;
 }
 
 // The observations of the first `num_observers` poses; landmarks that have fewer than two are left out.
@@ -54,32 +54,32 @@ void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size
   }
 }
 
-// Ties of the double window. Two outer poses are tied once, by the older one's or the younger one's choice.
-void AddTies(const Map& map, size_t num_inner, BundleProblem& problem) {
+// Constraints of the double window. Two outer poses have one constraint, whichever of them chose the other.
+void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
   const double rad_per_px = kKeypointSigmaPx / problem.calibration.fx_px;
   const auto index_of = [&](KeyframeId id) {
     const auto found =
         std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& pose) { return pose.id == id; });
     return static_cast<size_t>(found - problem.poses.begin());
   };
-  std::set<std::pair<size_t, size_t>> ties;
+  std::set<std::pair<size_t, size_t>> constrained;
   for (size_t i = num_inner; i < problem.poses.size(); ++i) {
     const Keyframe& keyframe = *map.FindKeyframe(problem.poses[i].id);
     const double depth = MedianDepth(map, keyframe);
-    int num_ties = 0;
+    int num_constraints = 0;
     for (const KeyframeId id : map.Covisible(problem.poses[i].id, static_cast<int>(keyframe.covisible.size()))) {
       const size_t other = index_of(id);
       if (other == problem.poses.size()) continue;
-      if (num_ties++ == kMaxTies) break;
-      if (!ties.insert(std::minmax(i, other)).second) continue;
-      RelativePoseConstraint tie;
-      tie.from = static_cast<int>(i);
-      tie.to = static_cast<int>(other);
-      tie.to_from_from = problem.poses[other].camera_from_world * problem.poses[i].camera_from_world.Inverse();
+      if (num_constraints++ == kMaxConstraints) break;
+      if (!constrained.insert(std::minmax(i, other)).second) continue;
+      RelativePoseConstraint constraint;
+      constraint.from = static_cast<int>(i);
+      constraint.to = static_cast<int>(other);
+      constraint.to_from_from = problem.poses[other].camera_from_world * problem.poses[i].camera_from_world.Inverse();
       const double num_shared = keyframe.covisible.at(id);
-      tie.information *= num_shared / (rad_per_px * rad_per_px);
-      tie.information.topLeftCorner<3, 3>() /= depth * depth;
-      problem.constraints.push_back(tie);
+      constraint.information *= num_shared / (rad_per_px * rad_per_px);
+      constraint.information.topLeftCorner<3, 3>() /= depth * depth;
+      problem.constraints.push_back(constraint);
     }
   }
 }
@@ -101,7 +101,7 @@ int ScalePose(const BundleProblem& problem) {
   return best;
 }
 
-// Landmarks that only `id` sees are tied to it.
+// Landmarks that only keyframe `id` observes move with it.
 void MoveOwnLandmarks(KeyframeId id, const Rigid3& world_from_camera, MapEditor& editor) {
   const Map& map = editor.map();
   const Keyframe& keyframe = *map.FindKeyframe(id);
@@ -122,7 +122,7 @@ BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const
   problem.baseline_m = Baseline(problem.calibration);
   AddPoses(map, window, options.is_double, problem);
   AddLandmarks(map, window.landmarks, options.is_double ? window.inner.size() : problem.poses.size(), problem);
-  if (options.is_double) AddTies(map, window.inner.size(), problem);
+  if (options.is_double) AddConstraints(map, window.inner.size(), problem);
   problem.scale_pose = problem.constraints.empty() ? ScalePose(problem) : -1;
   return problem;
 }

@@ -25,32 +25,32 @@ bool IsFinite(const PoseGraphProblem& problem) {
                      [](const PoseGraphEdge& edge) { return IsFinite(edge.to_from_from); });
 }
 
-// Nodes that a chain of edges ties to a fixed one: all others could float away together.
-std::vector<char> TiedToFixed(const PoseGraphProblem& problem) {
-  std::vector<std::vector<size_t>> neighbours(problem.nodes.size());
+// Nodes that a chain of edges connects with a fixed one: all others could drift away together.
+std::vector<char> ConnectedToFixed(const PoseGraphProblem& problem) {
+  std::vector<std::vector<size_t>> neighbors(problem.nodes.size());
   for (const PoseGraphEdge& edge : problem.edges) {
-    neighbours[static_cast<size_t>(edge.from)].push_back(static_cast<size_t>(edge.to));
-    neighbours[static_cast<size_t>(edge.to)].push_back(static_cast<size_t>(edge.from));
+    neighbors[static_cast<size_t>(edge.from)].push_back(static_cast<size_t>(edge.to));
+    neighbors[static_cast<size_t>(edge.to)].push_back(static_cast<size_t>(edge.from));
   }
-  std::vector<char> is_tied(problem.nodes.size(), 0);
+  std::vector<char> is_connected(problem.nodes.size(), 0);
   std::vector<size_t> to_visit;
   for (size_t i = 0; i < problem.nodes.size(); ++i) {
     if (problem.nodes[i].is_fixed) {
-      is_tied[i] = 1;
+      is_connected[i] = 1;
       to_visit.push_back(i);
     }
   }
   while (!to_visit.empty()) {
     const size_t node = to_visit.back();
     to_visit.pop_back();
-    for (const size_t neighbour : neighbours[node]) {
-      if (!is_tied[neighbour]) {
-        is_tied[neighbour] = 1;
-        to_visit.push_back(neighbour);
+    for (const size_t neighbor : neighbors[node]) {
+      if (!is_connected[neighbor]) {
+        is_connected[neighbor] = 1;
+        to_visit.push_back(neighbor);
       }
     }
   }
-  return is_tied;
+  return is_connected;
 }
 
 ceres::Solver::Options SolverOptions(const PoseGraphOptions& options) {
@@ -79,7 +79,7 @@ class PoseGraphSolver {
   PoseGraphSolver(const PoseGraphProblem& problem, const PoseGraphOptions& options)
       : problem_(problem),
         options_(options),
-        is_tied_(TiedToFixed(problem)),
+        is_connected_(ConnectedToFixed(problem)),
         tangents_(kSize * problem.nodes.size(), 0.0) {
     for (size_t i = 0; i < problem.nodes.size(); ++i) {
       MovingNode node;
@@ -108,13 +108,13 @@ class PoseGraphSolver {
 
  private:
   double* Tangent(size_t node) { return tangents_.data() + kSize * node; }
-  bool IsFree(size_t node) const { return is_tied_[node] && !problem_.nodes[node].is_fixed; }
+  bool IsFree(size_t node) const { return is_connected_[node] && !problem_.nodes[node].is_fixed; }
 
   // False if none is free.
   bool AddNodes(ceres::Problem& ceres_problem) {
     bool is_any_free = false;
     for (size_t i = 0; i < nodes_.size(); ++i) {
-      if (!is_tied_[i]) continue;
+      if (!is_connected_[i]) continue;
       ceres_problem.AddParameterBlock(Tangent(i), kSize);
       if (problem_.nodes[i].is_fixed) ceres_problem.SetParameterBlockConstant(Tangent(i));
       is_any_free = is_any_free || IsFree(i);
@@ -125,7 +125,7 @@ class PoseGraphSolver {
   void AddEdges(ceres::Problem& ceres_problem) {
     for (const PoseGraphEdge& edge : problem_.edges) {
       const auto from = static_cast<size_t>(edge.from), to = static_cast<size_t>(edge.to);
-      if (!is_tied_[from]) continue;
+      if (!is_connected_[from]) continue;
       costs_.push_back(std::make_unique<PoseGraphCost<kSize>>(edge, options_, nodes_[from], nodes_[to]));
       ceres_problem.AddResidualBlock(costs_.back().get(), nullptr, Tangent(from), Tangent(to));
     }
@@ -143,7 +143,7 @@ class PoseGraphSolver {
 
   const PoseGraphProblem& problem_;
   const PoseGraphOptions& options_;
-  const std::vector<char> is_tied_;
+  const std::vector<char> is_connected_;
   std::vector<double> tangents_;
   std::vector<MovingNode> nodes_;
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;

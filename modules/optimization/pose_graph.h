@@ -1,4 +1,4 @@
-// Spreads the error of loops over the keyframes between: what is optimised are relative poses, not landmarks.
+// Spreads the error of loops over the keyframes between: what is optimized are relative poses, not landmarks.
 #pragma once
 
 #include <optional>
@@ -49,7 +49,7 @@ struct PoseGraphOptions {
   std::string Check() const;
 };
 
-// Minimises over the free S = world_from_keyframe, in Ceres (sparse Cholesky),
+// Minimizes over the free S = world_from_keyframe, in Ceres (sparse Cholesky),
 //
 //   1/2 sum_edges weight * |r|^2
 //   r = (t / (length translation_sigma), log(R) / rotation_sigma_rad, ln(s) / log_scale_sigma)
@@ -58,9 +58,9 @@ struct PoseGraphOptions {
 // after H. Strasdat, J. M. M. Montiel, A. Davison, "Scale Drift-Aware Large Scale Monocular SLAM", RSS 2010; (t, log R,
 // ln s) equals the logarithm of Sim(3) that is used there to first order. Without scale r has six rows.
 //
-// Returns world_from_keyframe by node; fixed nodes, and those that no chain of edges ties to a fixed one, to the bit as
-// given. A pure function of the values given. Throws std::invalid_argument with Check()'s sentence where problem or
-// options are malformed. nullopt where nothing is free, a value is not finite, or the solver found no step.
+// Returns world_from_keyframe by node; fixed nodes, and those that no chain of edges connects with a fixed one, to the
+// bit as given. A pure function of the values given. Throws std::invalid_argument with Check()'s sentence where problem
+// or options are malformed. nullopt where nothing is free, a value is not finite, or the solver found no step.
 std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& problem, const PoseGraphOptions& options);
 
 }  // namespace tessera

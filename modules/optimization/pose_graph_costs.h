@@ -1,6 +1,6 @@
 // The residual of a pose graph's edge as Ceres wants it. Only this module's sources and its tests include this file.
 //
-// As in bundle_costs.h a node is optimised as a plain vector, its change since the solve began:
+// As in bundle_costs.h a node is optimized as a plain vector, its change since the solve began:
 //
 //   world_from_keyframe = (scale e^c, Exp(w) rotation, translation + v),   tangent (v, w) or (v, w, c)
 //

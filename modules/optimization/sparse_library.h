@@ -1,4 +1,4 @@
-// The sparse Cholesky factorisation of all large problems.
+// The sparse Cholesky factorization of all large problems.
 #pragma once
 
 #include <ceres/types.h>

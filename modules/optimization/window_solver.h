@@ -46,7 +46,7 @@ class WindowSolver {
   struct Step {
     std::vector<Vector6d> poses;          // by free pose
     std::vector<Eigen::Vector3d> points;  // by point
-    double model_decrease = 0.0;          // of the cost, by the linearised residuals
+    double model_decrease = 0.0;          // of the cost, by the linearized residuals
   };
 
   void SelectTerms(const std::vector<char>& takes_part);
@@ -70,7 +70,7 @@ class WindowSolver {
   std::vector<Term> terms_;             // point after point
   std::vector<size_t> terms_of_point_;  // by point: its first term; one more at the end
 
-  // The linearised problem.
+  // The linearized problem.
   std::vector<Matrix6d> u_;
   std::vector<Vector6d> g_pose_;
   std::vector<Eigen::Matrix3d> v_;

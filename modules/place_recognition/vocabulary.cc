@@ -38,7 +38,7 @@ std::vector<std::pair<int32_t, float>> WeighWords(const std::vector<std::pair<in
 }  // namespace
 
 std::string VocabularyTree::Check() const {
-  if (num_children.empty() || num_children.size() != centers.size()) return "it has not one centre for each node";
+  if (num_children.empty() || num_children.size() != centers.size()) return "it has not one center for each node";
   int64_t num_reached = 1;  // the root
   size_t num_words = 0;
   for (size_t node = 0; node < num_children.size(); ++node) {

@@ -1,7 +1,7 @@
 // Vocabularies on disk. All numbers least significant byte first:
 //
 //   "tessera vocabulary\n", version (4), num_nodes (4), num_words (4), direct_level (4), length of the origin (4),
-//   origin, number of children of each node (1), centre of each node (4 x 8), weight of each word (float, 4), SHA-256
+//   origin, number of children of each node (1), center of each node (4 x 8), weight of each word (float, 4), SHA-256
 //   of all that in 64 hexadecimal digits.
 #include <bit>
 #include <cstring>

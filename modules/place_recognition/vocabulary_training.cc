@@ -55,7 +55,7 @@ size_t IndexAtSum(const std::vector<int>& weights, uint64_t target) {
   throw std::logic_error("the weights sum up to less than the target");
 }
 
-// Squared distances from the nearest centre when one more joins.
+// Squared distances from the nearest center when one more joins.
 std::vector<int> Join(const std::vector<Descriptor>& members, const Descriptor& center, std::vector<int> squared) {
   for (size_t i = 0; i < members.size(); ++i) {
     const int distance = HammingDistance(members[i], center);
@@ -66,7 +66,7 @@ std::vector<int> Join(const std::vector<Descriptor>& members, const Descriptor& 
 
 uint64_t Sum(const std::vector<int>& values) { return std::accumulate(values.begin(), values.end(), uint64_t{0}); }
 
-// At most k centres, all different. Each is the best of a few drawn ones: a single draw often puts two into one
+// At most k centers, all different. Each is the best of a few drawn ones: a single draw often puts two into one
 // cluster.
 std::vector<Descriptor> ChooseCenters(const std::vector<Descriptor>& members, int k, std::mt19937_64& generator) {
   constexpr int kNumDraws = 4;
@@ -74,7 +74,7 @@ std::vector<Descriptor> ChooseCenters(const std::vector<Descriptor>& members, in
   std::vector<int> squared(members.size(), static_cast<int>(kNumBits * kNumBits));
   squared = Join(members, centers[0], std::move(squared));
   uint64_t sum = Sum(squared);
-  while (centers.size() < static_cast<size_t>(k) && sum > 0) {  // 0: every member is a centre
+  while (centers.size() < static_cast<size_t>(k) && sum > 0) {  // 0: every member is a center
     Descriptor best{};
     std::vector<int> best_squared;
     uint64_t best_sum = sum;
@@ -107,7 +107,7 @@ uint8_t NearestCenter(const std::vector<Descriptor>& centers, const Descriptor& 
   return static_cast<uint8_t>(nearest);
 }
 
-// Moves the centres to where they are the majority of their members; one without members stays.
+// Moves the centers to where they are the majority of their members; one without members stays.
 void MoveCenters(const std::vector<Descriptor>& members, const std::vector<uint8_t>& assignment,
                  std::vector<Descriptor>& centers) {
   std::vector<BitCounter> counters(centers.size());
@@ -117,7 +117,7 @@ void MoveCenters(const std::vector<Descriptor>& members, const std::vector<uint8
   }
 }
 
-// The parts of a node, none empty. Members are with the nearest of the centres, as they will be when words are looked
+// The parts of a node, none empty. Members are with the nearest of the centers, as they will be when words are looked
 // up.
 std::vector<Cluster> Split(const std::vector<Descriptor>& members, const VocabularyOptions& options,
                            std::mt19937_64& generator) {

@@ -51,10 +51,10 @@ class RoomBuilder {
     const double length = (to - from).norm();
     const Eigen::Vector2d along = (to - from) / length;
     const Eigen::Vector2d inwards = RightOf(along);
-    for (double place = 0.5; place + 0.5 < length;) {
+    for (double position = 0.5; position + 0.5 < length;) {
       const double width = random_.Uniform(0.4, 1.3);
-      if (place + width + 0.4 > length) break;
-      const Eigen::Vector2d middle = from + (place + 0.5 * width) * along;
+      if (position + width + 0.4 > length) break;
+      const Eigen::Vector2d middle = from + (position + 0.5 * width) * along;
       const double draw = random_.Uniform(0.0, 1.0);
       if (draw < 0.3) {
         PutCupboard(middle, along, inwards, width, random_.Uniform(1.6, 2.1), Material::kBooks);
@@ -66,7 +66,7 @@ class RoomBuilder {
       } else {
         Hang(middle, along, inwards, width);
       }
-      place += width + random_.Uniform(0.05, 0.5);
+      position += width + random_.Uniform(0.05, 0.5);
     }
   }
 
@@ -85,10 +85,10 @@ class RoomBuilder {
     for (int i = 0; i < num_things; ++i) {
       const double half = random_.Uniform(0.04, 0.14);
       const double tall = random_.Uniform(0.08, 0.4);
-      const Eigen::Vector2d place = middle + random_.Uniform(-reach, reach) * along;
+      const Eigen::Vector2d position = middle + random_.Uniform(-reach, reach) * along;
       const int32_t face = Paint(Material::kPoster, 2.0 * half, tall, 0.003);
-      builder_.Add(builder_.Box(place, along, half, half, height, tall, face, face));
-      builder_.Add(builder_.Lid(place, along, half, half, height + tall, face));
+      builder_.Add(builder_.Box(position, along, half, half, height, tall, face, face));
+      builder_.Add(builder_.Lid(position, along, half, half, height + tall, face));
     }
   }
 

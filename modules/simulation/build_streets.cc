@@ -11,7 +11,7 @@ namespace {
 // The drive cuts corners at crossings; so near its line nothing stands.
 constexpr double kDriveGapM = 2.2;
 
-// A place beside a street.
+// A position beside a street.
 struct Spot {
   Eigen::Vector2d on_middle;  // the street's middle line
   Eigen::Vector2d along;      // unit; such that `out` is to its right
@@ -28,7 +28,7 @@ class StreetBuilder {
     for (const Polyline& street : plan_.streets) {
       for (const double side : {1.0, -1.0}) {
         BuildHouses(street, side);
-        BuildKerbs(street, side);
+        BuildKurbs(street, side);
         BuildVerge(street, side);
         ParkCars(street, side);
       }
@@ -110,8 +110,8 @@ class StreetBuilder {
       const double reach = random_.Uniform(0.25, 0.7);
       const double bottom = random_.Chance(0.5) ? 3.0 : 0.0;
       const double tall = std::min(height - bottom - 1.0, random_.Uniform(1.0, 6.0));
-      const double place = random_.Uniform(half, width - half);
-      const Eigen::Vector2d middle = left + place * (right - left) / width + 0.5 * reach * out;
+      const double position = random_.Uniform(half, width - half);
+      const Eigen::Vector2d middle = left + position * (right - left) / width + 0.5 * reach * out;
       const int32_t paint = builder_.AddPaint({Material::kFacade, random_.Next(), 2.0 * half, tall, 0.02});
       const int32_t side = builder_.AddPaint({Material::kBark, random_.Next(), reach, tall, 0.03});
       const Eigen::Vector2d ahead = (right - left) / width;
@@ -119,35 +119,35 @@ class StreetBuilder {
     }
   }
 
-  void BuildKerbs(const Polyline& street, double side) {
+  void BuildKurbs(const Polyline& street, double side) {
     const Polyline posts = Resample(street, 4.0);
     for (size_t i = 0; i + 1 < posts.size(); ++i) {
       const Spot here = SpotAt(posts, i, side);
       const Spot next = SpotAt(posts, i + 1, side);
-      const Eigen::Vector2d a = here.on_middle + kKerbM * here.out;
-      const Eigen::Vector2d b = next.on_middle + kKerbM * next.out;
-      if (world_.streets->DistanceToStreet(a) < kKerbM - 0.1 || world_.streets->DistanceToStreet(b) < kKerbM - 0.1)
+      const Eigen::Vector2d a = here.on_middle + kCurbM * here.out;
+      const Eigen::Vector2d b = next.on_middle + kCurbM * next.out;
+      if (world_.streets->DistanceToStreet(a) < kCurbM - 0.1 || world_.streets->DistanceToStreet(b) < kCurbM - 0.1)
         continue;
-      const int32_t paint = builder_.AddPaint({Material::kKerb, random_.Next(), 4.0, 0.13, 0.02});
+      const int32_t paint = builder_.AddPaint({Material::kKurb, random_.Next(), 4.0, 0.13, 0.02});
       // Seen from the road, whose side is left of `along`.
       builder_.Add(side > 0.0 ? builder_.Wall(b, a, 0.0, 0.13, paint) : builder_.Wall(a, b, 0.0, 0.13, paint));
     }
   }
 
-  // Trees, lamps, signs, hedges and fences between kerb and houses.
+  // Trees, lamps, signs, hedges and fences between kurb and houses.
   void BuildVerge(const Polyline& street, double side) {
     const Polyline posts = Resample(street, 1.0);
     for (size_t i = 1; i + 1 < posts.size(); i += 2 + static_cast<size_t>(random_.Index(7))) {
       const Spot spot = SpotAt(posts, i, side);
-      const Eigen::Vector2d near = spot.on_middle + random_.Uniform(kKerbM + 0.4, kLotLineM - 0.5) * spot.out;
+      const Eigen::Vector2d near = spot.on_middle + random_.Uniform(kCurbM + 0.4, kLotLineM - 0.5) * spot.out;
       const Eigen::Vector2d far = spot.on_middle + random_.Uniform(kLotLineM + 1.0, kLotLineM + 4.0) * spot.out;
       const double draw = random_.Uniform(0.0, 1.0);
       if (draw < 0.25) {
         if (IsFree(far, spot.along, 0.5, 0.5, kLotLineM)) PlantTree(far);
       } else if (draw < 0.42) {
-        if (IsFree(near, spot.along, 0.2, 0.2, kKerbM + 0.3)) PlantTree(near);
+        if (IsFree(near, spot.along, 0.2, 0.2, kCurbM + 0.3)) PlantTree(near);
       } else if (draw < 0.7) {
-        if (IsFree(near, spot.along, 0.2, 0.2, kKerbM + 0.3)) PutPole(near, spot);
+        if (IsFree(near, spot.along, 0.2, 0.2, kCurbM + 0.3)) PutPole(near, spot);
       } else {
         PutFence(spot.on_middle + (kLotLineM + 0.2) * spot.out, spot);
       }
@@ -252,7 +252,7 @@ class StreetBuilder {
                           1.0F});
     constexpr int kNumBlocks = 90;
     for (int i = 0; i < kNumBlocks; ++i) {
-      // Directions around the circle by an exact rational parametrisation of each quarter.
+      // Directions around the circle by an exact rational parametrization of each quarter.
       const double t = random_.Uniform(0.0, 1.0);
       const double c = (1.0 - t * t) / (1.0 + t * t);
       const double s = 2.0 * t / (1.0 + t * t);
@@ -278,10 +278,10 @@ class StreetBuilder {
       lane.push_back(way[i] + kRoadHalfWidthM * RightOf(along.normalized()));
     }
     const double length = LengthOf(lane);
-    for (double place = random_.Uniform(40.0, 100.0); place < length; place += random_.Uniform(90.0, 260.0)) {
+    for (double position = random_.Uniform(40.0, 100.0); position < length; position += random_.Uniform(90.0, 260.0)) {
       MovingCar car;
       car.way = lane;
-      car.start_m = place;
+      car.start_m = position;
       car.speed_mps = random_.Uniform(6.0, 11.0);
       car.body = BuildCar({0.0, 0.0}, {0.0, 1.0}, random_.Next(), builder_);
       world_.cars.push_back(std::move(car));

@@ -106,9 +106,9 @@ GrayImage EffectsPipeline::Apply(const Rendering& rendering, const CameraVelocit
       0.7 * SmoothNoise(HashOf(seed_, 31), 0.15 * time_s) + 0.3 * SmoothNoise(HashOf(seed_, 32), 0.8 * time_s);
   const auto gain = static_cast<float>((1.0 + effects_.exposure_drift * drift) / 256.0);
   std::array<float, 256> sigma{};
-  for (size_t grey = 0; grey < sigma.size(); ++grey) {
-    sigma[grey] = static_cast<float>(
-        std::sqrt(effects_.read_noise * effects_.read_noise + effects_.shot_noise * static_cast<double>(grey)));
+  for (size_t gray = 0; gray < sigma.size(); ++gray) {
+    sigma[gray] = static_cast<float>(
+        std::sqrt(effects_.read_noise * effects_.read_noise + effects_.shot_noise * static_cast<double>(gray)));
   }
   GrayImage image(camera_.width_px, camera_.height_px);
   for (int y = 0; y < image.height; ++y) {
@@ -117,9 +117,9 @@ GrayImage EffectsPipeline::Apply(const Rendering& rendering, const CameraVelocit
     const float* vignette = vignette_.row(y);
     uint8_t* out = image.row(y);
     for (int x = 0; x < image.width; ++x) {
-      const float grey = std::clamp(static_cast<float>(light[x]) * gain * vignette[x], 0.0F, 255.0F);
-      const float noise = sigma[static_cast<size_t>(grey)] * NormalOf(PixelHash(row_seed, static_cast<uint32_t>(x)));
-      out[x] = static_cast<uint8_t>(std::clamp(grey + noise + 0.5F, 0.0F, 255.0F));
+      const float gray = std::clamp(static_cast<float>(light[x]) * gain * vignette[x], 0.0F, 255.0F);
+      const float noise = sigma[static_cast<size_t>(gray)] * NormalOf(PixelHash(row_seed, static_cast<uint32_t>(x)));
+      out[x] = static_cast<uint8_t>(std::clamp(gray + noise + 0.5F, 0.0F, 255.0F));
     }
   }
   return image;

@@ -1,4 +1,4 @@
-// From light to grey values: what a real camera adds to a perfect picture.
+// From light to gray values: what a real camera adds to a perfect picture.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,9 +14,9 @@ struct CameraEffects {
   double exposure_s = 0.006;     // motion blur: the shutter is open for so long
   double exposure_drift = 0.12;  // the gain wanders within 1 +- this, over some seconds
   double vignetting = 0.2;       // light lost in the corners
-  double read_noise = 1.3;       // standard deviation in the dark, grey values
-  double shot_noise = 0.012;     // variance per grey value of light
-  double depth_noise = 0.0015;   // RGB-D: standard deviation of depth per squared metre, 1/m
+  double read_noise = 1.3;       // standard deviation in the dark, gray values
+  double shot_noise = 0.012;     // variance per gray value of light
+  double depth_noise = 0.0015;   // RGB-D: standard deviation of depth per squared meter, 1/m
 };
 
 // The camera's velocity in its own frame, per second.
@@ -29,7 +29,7 @@ class EffectsPipeline {
  public:
   EffectsPipeline(const CameraCalibration& camera, const CameraEffects& effects, uint32_t seed);
 
-  // Blurs along the apparent motion, spreads light over neighbouring pixels (1 6 1) / 8 in both directions, applies
+  // Blurs along the apparent motion, spreads light over neighboring pixels (1 6 1) / 8 in both directions, applies
   // gain and vignetting, adds noise. `picture` numbers the pictures of all eyes; the gain depends on `time_s` alone.
   GrayImage Apply(const Rendering& rendering, const CameraVelocity& velocity, double time_s, uint32_t picture);
   // Depth counts of calibration.depth_unit_m, with noise; 0 where nothing is or the count does not fit.

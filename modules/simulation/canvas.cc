@@ -62,7 +62,7 @@ size_t FieldIndex(uint32_t seed, int x, int y) {
   return static_cast<size_t>(j) * kFieldSize + i;
 }
 
-uint8_t ToGrey(float value) { return static_cast<uint8_t>(std::clamp(value, 0.0F, 255.0F)); }
+uint8_t ToGray(float value) { return static_cast<uint8_t>(std::clamp(value, 0.0F, 255.0F)); }
 
 int TexelsIn(double length_m, double texel_m) { return std::max(2, static_cast<int>(std::lround(length_m / texel_m))); }
 
@@ -101,7 +101,7 @@ void Canvas::Fill(const Area& area, double tone, const Grain& grain) {
   const uint32_t seed = HashOf(grain_seed_, random_.Next());
   for (int y = rect.y; y < rect.bottom(); ++y) {
     for (int x = rect.x; x < rect.right(); ++x) {
-      image_.row(y)[x] = ToGrey(base + fine * SpeckleAt(seed, x, y) + coarse * StainAt(seed, x, y));
+      image_.row(y)[x] = ToGray(base + fine * SpeckleAt(seed, x, y) + coarse * StainAt(seed, x, y));
     }
   }
 }

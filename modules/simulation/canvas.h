@@ -1,4 +1,4 @@
-// A wall to paint on, measured in metres from its bottom left corner: x to the right, y up.
+// A wall to paint on, measured in meters from its bottom left corner: x to the right, y up.
 #pragma once
 
 #include <cstdint>
@@ -15,15 +15,15 @@ struct Area {
   double height_m = 0.0;
 };
 
-// How rough a surface looks: deviations from its tone, in grey values.
+// How rough a surface looks: deviations from its tone, in gray values.
 struct Grain {
-  double fine = 4.0;     // of texels and their neighbours
-  double coarse = 10.0;  // of stains of about a metre
+  double fine = 4.0;     // of texels and their neighbors
+  double coarse = 10.0;  // of stains of about a meter
 };
 
 class Canvas {
  public:
-  // Grey of `tone` (0..255) all over.
+  // Gray of `tone` (0..255) all over.
   Canvas(double width_m, double height_m, double texel_m, uint32_t seed, double tone, const Grain& grain);
 
   // A rectangle of another material; what lies outside the canvas is cut off.
@@ -53,7 +53,7 @@ class Canvas {
 
 // A value in [-1, 1] that varies smoothly over some 20 texels, the same for the same texel and seed. Cheap.
 float StainAt(uint32_t seed, int x, int y);
-// A value in [-1, 1] of a single texel with a little of its neighbours in it. Cheap.
+// A value in [-1, 1] of a single texel with a little of its neighbors in it. Cheap.
 float SpeckleAt(uint32_t seed, int x, int y);
 
 }  // namespace tessera

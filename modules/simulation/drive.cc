@@ -136,7 +136,7 @@ StreetPlan PlanFromPoses(const std::string& path, double length_m) {
     const Eigen::Vector2d p(m[3], m[11]);
     if (way.empty() || (p - way.back()).norm() > 0.1) way.push_back(p);
   }
-  if (way.size() < 2) throw InputError(path + " holds no drive: fewer than two places");
+  if (way.size() < 2) throw InputError(path + " holds no drive: fewer than two positions");
   StreetPlan plan;
   plan.drive = Shorten(Resample(way, kStepM), length_m);
   // A street is built where the drive comes for the first time.
@@ -199,9 +199,9 @@ double CarTrajectory::DistanceAt(double time_s) const {
 
 Eigen::Vector2d CarTrajectory::PointAt(double distance_m) const {
   const double last = static_cast<double>(points_.size() - 1);
-  const double place = std::clamp(distance_m / kStepM, 0.0, last - 1e-6);
-  const auto i = static_cast<size_t>(place);
-  return points_[i] + (place - static_cast<double>(i)) * (points_[i + 1] - points_[i]);
+  const double position = std::clamp(distance_m / kStepM, 0.0, last - 1e-6);
+  const auto i = static_cast<size_t>(position);
+  return points_[i] + (position - static_cast<double>(i)) * (points_[i + 1] - points_[i]);
 }
 
 Eigen::Vector2d CarTrajectory::PositionAt(double time_s) const { return PointAt(DistanceAt(time_s)); }
@@ -217,11 +217,12 @@ Eigen::Vector2d CarTrajectory::DirectionAt(double time_s) const {
 }
 
 Rigid3 CarTrajectory::WorldFromCamera(double time_s) const {
-  const Eigen::Vector2d place = PositionAt(time_s);
+  const Eigen::Vector2d position = PositionAt(time_s);
   const Eigen::Vector2d direction = DirectionAt(time_s);
   const auto sway = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, axis), hertz * time_s); };
   const double heave = 0.012 * sway(1, 3.0);
-  const Rigid3 level = LookAlong({place.x(), -kCameraHeightM + heave, place.y()}, {direction.x(), 0.0, direction.y()});
+  const Rigid3 level =
+      LookAlong({position.x(), -kCameraHeightM + heave, position.y()}, {direction.x(), 0.0, direction.y()});
   // Small angles as half-angle quaternions: no trigonometry, exact arithmetic.
   const double pitch = 0.006 * sway(2, 2.1) + 0.003 * sway(3, 5.0);
   const double roll = 0.005 * sway(4, 1.7);
@@ -243,7 +244,7 @@ Rigid3 HandTrajectory::WorldFromCamera(double time_s) const {
   const Eigen::Vector3d position(0.2 * room_m_.x() * Wave(round + shift) + tremor(2),
                                  -1.45 + 0.15 * Wave(2.0 * round) + tremor(3),
                                  0.2 * room_m_.z() * Wave(round + shift + 0.25) + tremor(4));
-  // Looks at a place that goes along the walls.
+  // Looks at a position that goes along the walls.
   const double gaze = round + shift + 0.04 * Wave(3.0 * round);
   const Eigen::Vector3d target(0.5 * room_m_.x() * Wave(gaze + 0.06), -1.1 + 0.35 * Wave(2.0 * round + 0.3),
                                0.5 * room_m_.z() * Wave(gaze + 0.31));

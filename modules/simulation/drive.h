@@ -38,7 +38,7 @@ class CarTrajectory : public Trajectory {
   CarTrajectory(const Polyline& drive, double speed, uint32_t seed);
   double duration_s() const override;
   Rigid3 WorldFromCamera(double time_s) const override;
-  // The car's place on the ground and its direction.
+  // The car's position on the ground and its direction.
   Eigen::Vector2d PositionAt(double time_s) const;
   Eigen::Vector2d DirectionAt(double time_s) const;
 

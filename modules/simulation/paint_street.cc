@@ -9,14 +9,14 @@
 namespace tessera {
 namespace {
 
-uint8_t ToGrey(double value) { return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0)); }
+uint8_t ToGray(double value) { return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0)); }
 
 // Distance of a point to the nearest multiple of `period`, beside `phase`.
 double ToNearestMultiple(double x, double period) { return std::abs(x - period * std::floor(x / period + 0.5)); }
 
-double AsphaltTone(const StreetPlace& place, uint32_t seed, int x, int y) {
+double AsphaltTone(const StreetPosition& position, uint32_t seed, int x, int y) {
   // Wheels polish two tracks in each lane; repairs leave patches of another tone.
-  const double in_lane = std::abs(std::abs(place.lateral_m) - 0.5 * kRoadHalfWidthM);
+  const double in_lane = std::abs(std::abs(position.lateral_m) - 0.5 * kRoadHalfWidthM);
   const double track = std::abs(in_lane - 0.75) < 0.25 ? 9.0 : 0.0;
   const float patch = StainAt(HashOf(seed, 5), x / 6, y / 6);
   const double repair = patch > 0.55F ? -22.0 : (patch < -0.6F ? 15.0 : 0.0);
@@ -26,16 +26,17 @@ double AsphaltTone(const StreetPlace& place, uint32_t seed, int x, int y) {
          9.0 * static_cast<double>(StainAt(seed, x, y));
 }
 
-bool IsPaintedLine(const StreetPlace& place) {
-  const bool is_dash = place.along_m - 6.0 * std::floor(place.along_m / 6.0) < 3.0;
-  return (std::abs(place.lateral_m) < 0.07 && is_dash) || std::abs(std::abs(place.lateral_m) - kRoadHalfWidthM) < 0.06;
+bool IsPaintedLine(const StreetPosition& position) {
+  const bool is_dash = position.along_m - 6.0 * std::floor(position.along_m / 6.0) < 3.0;
+  return (std::abs(position.lateral_m) < 0.07 && is_dash) ||
+         std::abs(std::abs(position.lateral_m) - kRoadHalfWidthM) < 0.06;
 }
 
-double PavementTone(const StreetPlace& place, uint32_t seed, int x, int y) {
-  const auto slab = HashOf(static_cast<uint32_t>(static_cast<int>(std::floor(place.along_m / 0.6))),
-                           static_cast<uint32_t>(static_cast<int>(std::floor(place.lateral_m / 0.6))));
+double PavementTone(const StreetPosition& position, uint32_t seed, int x, int y) {
+  const auto slab = HashOf(static_cast<uint32_t>(static_cast<int>(std::floor(position.along_m / 0.6))),
+                           static_cast<uint32_t>(static_cast<int>(std::floor(position.lateral_m / 0.6))));
   const bool is_joint =
-      ToNearestMultiple(place.along_m, 0.6) < 0.015 || ToNearestMultiple(place.lateral_m, 0.6) < 0.015;
+      ToNearestMultiple(position.along_m, 0.6) < 0.015 || ToNearestMultiple(position.lateral_m, 0.6) < 0.015;
   return (is_joint ? 92.0 : 138.0) + 16.0 * static_cast<double>(UnitOf(slab)) +
          12.0 * static_cast<double>(SpeckleAt(seed, x, y)) + 10.0 * static_cast<double>(StainAt(seed, x, y));
 }
@@ -45,18 +46,18 @@ double GrassTone(uint32_t seed, int x, int y) {
          22.0 * static_cast<double>(StainAt(HashOf(seed, 2), x / 2, y / 2));
 }
 
-// Sides and ends of a car have one colour.
+// Sides and ends of a car have one color.
 double CarTone(uint32_t seed) {
   Random random(HashOf(seed, 13));
   return random.Chance(0.5) ? random.Uniform(25.0, 90.0) : random.Uniform(130.0, 225.0);
 }
 
-double GroundTone(const StreetPlace& place, uint32_t seed, int x, int y) {
-  const double side = std::abs(place.lateral_m);
+double GroundTone(const StreetPosition& position, uint32_t seed, int x, int y) {
+  const double side = std::abs(position.lateral_m);
   if (side > kLotLineM) return GrassTone(seed, x, y);
-  if (side > kKerbM) return PavementTone(place, seed, x, y);
-  if (IsPaintedLine(place)) return 205.0 + 18.0 * static_cast<double>(SpeckleAt(seed, x, y));
-  return AsphaltTone(place, seed, x, y);
+  if (side > kCurbM) return PavementTone(position, seed, x, y);
+  if (IsPaintedLine(position)) return 205.0 + 18.0 * static_cast<double>(SpeckleAt(seed, x, y));
+  return AsphaltTone(position, seed, x, y);
 }
 
 }  // namespace
@@ -64,27 +65,27 @@ double GroundTone(const StreetPlace& place, uint32_t seed, int x, int y) {
 Texture PaintGround(const PaintSpec& spec, const StreetMap& map) {
   GrayImage image(std::max(2, static_cast<int>(std::lround(spec.width_m / spec.texel_m))),
                   std::max(2, static_cast<int>(std::lround(spec.height_m / spec.texel_m))));
-  // The place in the street is looked up at every kStep-th texel and interpolated between.
+  // The position in the street is looked up at every kStep-th texel and interpolated between.
   constexpr int kStep = 8;
   // Grain goes on across the borders of tiles.
   const int first_x = static_cast<int>(std::lround(spec.origin.x() / spec.texel_m));
   const int first_y = static_cast<int>(std::lround(spec.origin.y() / spec.texel_m));
   for (int y = 0; y < image.height; ++y) {
     const double z_m = spec.origin.y() + (image.height - 0.5 - y) * spec.texel_m;
-    StreetPlace place;
-    StreetPlace next = map.PlaceOf({spec.origin.x() + 0.5 * spec.texel_m, z_m});
+    StreetPosition position;
+    StreetPosition next = map.PositionOf({spec.origin.x() + 0.5 * spec.texel_m, z_m});
     for (int x = 0; x < image.width; ++x) {
       if (x % kStep == 0) {
-        place = next;
-        next = map.PlaceOf({spec.origin.x() + (x + kStep + 0.5) * spec.texel_m, z_m});
+        position = next;
+        next = map.PositionOf({spec.origin.x() + (x + kStep + 0.5) * spec.texel_m, z_m});
       }
-      StreetPlace here = place;
-      if (std::abs(next.along_m - place.along_m) < 1.0 && std::abs(next.lateral_m - place.lateral_m) < 1.0) {
+      StreetPosition here = position;
+      if (std::abs(next.along_m - position.along_m) < 1.0 && std::abs(next.lateral_m - position.lateral_m) < 1.0) {
         const double part = static_cast<double>(x % kStep) / kStep;
-        here.along_m += part * (next.along_m - place.along_m);
-        here.lateral_m += part * (next.lateral_m - place.lateral_m);
+        here.along_m += part * (next.along_m - position.along_m);
+        here.lateral_m += part * (next.lateral_m - position.lateral_m);
       }
-      image.row(y)[x] = ToGrey(GroundTone(here, spec.seed, first_x + x, first_y + image.height - y));
+      image.row(y)[x] = ToGray(GroundTone(here, spec.seed, first_x + x, first_y + image.height - y));
     }
   }
   return MakeTexture(std::move(image), {});
@@ -104,7 +105,7 @@ Texture PaintFoliage(const PaintSpec& spec) {
                           0.35 * static_cast<double>(SpeckleAt(HashOf(spec.seed, 9), x, y));
       cover.row(y)[x] = edge + leaf > 0.25 ? 255 : 0;
       // Light comes from above.
-      image.row(y)[x] = ToGrey(static_cast<double>(image.row(y)[x]) - 30.0 * v);
+      image.row(y)[x] = ToGray(static_cast<double>(image.row(y)[x]) - 30.0 * v);
     }
   }
   return MakeTexture(std::move(image), std::move(cover));
@@ -165,7 +166,7 @@ Texture PaintSky(const PaintSpec& spec) {
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       const float cloud = FractalNoise(spec.seed, static_cast<float>(x) / 90.0F, static_cast<float>(y) / 90.0F, 4);
-      image.row(y)[x] = ToGrey(185.0 + 120.0 * std::max(0.0, static_cast<double>(cloud) - 0.42));
+      image.row(y)[x] = ToGray(185.0 + 120.0 * std::max(0.0, static_cast<double>(cloud) - 0.42));
     }
   }
   return MakeTexture(std::move(image), {});

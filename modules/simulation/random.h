@@ -7,7 +7,7 @@
 
 namespace tessera {
 
-// Mixes four numbers into one whose bits look independent (the finaliser of MurmurHash3, chained).
+// Mixes four numbers into one whose bits look independent (the finalizer of MurmurHash3, chained).
 inline uint32_t HashOf(uint32_t a, uint32_t b = 0, uint32_t c = 0, uint32_t d = 0) {
   uint32_t h = 0x9e3779b9U;
   for (const uint32_t word : {a, b, c, d}) {

@@ -14,12 +14,12 @@ namespace {
 constexpr double kNearM = 0.1;
 constexpr size_t kMaxPaintBytes = size_t{600} << 20;
 constexpr int kChunk = 16;  // pixels that share a level of the paint
-constexpr uint16_t kHorizonGrey = 205 * 256;
+constexpr uint16_t kHorizonGray = 205 * 256;
 
 // A parallelogram in camera coordinates, set up for drawing. With n = across x up, the plane's point on the ray
 // r = (x, y, 1) is r / w with
 //   w = 1 / z = (n . r) / (n . corner),
-// and its place in the parallelogram is, with the dual basis a* = (up x n) / |n|^2, b* = (n x across) / |n|^2,
+// and its position in the parallelogram is, with the dual basis a* = (up x n) / |n|^2, b* = (n x across) / |n|^2,
 //   a = (a* . r) / w - a* . corner,   b likewise:
 // each numerator is affine in the pixel.
 struct AffineRow {
@@ -158,8 +158,8 @@ void Drawer::DrawRow(const Plane& plane, const Surface& surface, const Texture& 
       const int down = b_fixed & 255;
       const int top = texel[0] * (256 - right) + texel[1] * right;
       const int bottom = texel[paint.width] * (256 - right) + texel[paint.width + 1] * right;
-      const int grey = (top * (256 - down) + bottom * down) >> 8;  // times 256
-      radiance[x] = static_cast<uint16_t>(std::min((grey * brightness) >> 8, 65535));
+      const int gray = (top * (256 - down) + bottom * down) >> 8;  // times 256
+      radiance[x] = static_cast<uint16_t>(std::min((gray * brightness) >> 8, 65535));
       inverse_depth[x] = w;
     }
   }
@@ -210,11 +210,11 @@ bool IsInSight(const Surface& surface, const CameraCalibration& camera) {
 
 // The car's body at this time; nullopt once it has left its way.
 std::optional<std::vector<Surface>> PlaceCar(const MovingCar& car, double time_s) {
-  const double place = (car.start_m + car.speed_mps * time_s) / kCarStepM;
-  if (place < 1.0 || place + 2.0 >= static_cast<double>(car.way.size())) return std::nullopt;
-  const auto i = static_cast<size_t>(place);
+  const double position = (car.start_m + car.speed_mps * time_s) / kCarStepM;
+  if (position < 1.0 || position + 2.0 >= static_cast<double>(car.way.size())) return std::nullopt;
+  const auto i = static_cast<size_t>(position);
   const Eigen::Vector2d step = car.way[i + 1] - car.way[i];
-  const Eigen::Vector2d middle = car.way[i] + (place - static_cast<double>(i)) * step;
+  const Eigen::Vector2d middle = car.way[i] + (position - static_cast<double>(i)) * step;
   // Between the directions of the segments before and after, so that the car turns smoothly.
   const Eigen::Vector2d ahead = (car.way[i + 2] - car.way[i - 1]).normalized();
   const Eigen::Vector2d right = RightOf(ahead);
@@ -276,7 +276,7 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& camera_fro
   visible_.clear();
   const Eigen::Vector3d eye = camera_from_world.Inverse().translation;
   const auto add = [&](const Surface& surface, double sight_m) {
-    const double distance = (surface.Centre() - eye).norm() - 0.5 * (surface.across + surface.up).norm();
+    const double distance = (surface.Center() - eye).norm() - 0.5 * (surface.across + surface.up).norm();
     if (distance >= sight_m) return;
     const Surface in_camera = InCamera(camera_from_world, surface);
     if (IsInSight(in_camera, camera)) visible_.push_back({distance, visible_.size(), in_camera});
@@ -285,7 +285,7 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& camera_fro
   for (const Surface& surface : world_->far) add(surface, 1e9);
   for (const MovingCar& car : world_->cars) {
     const auto body = PlaceCar(car, time_s);
-    if (!body || (body->front().Centre() - eye).norm() < kCarGapM) continue;
+    if (!body || (body->front().Center() - eye).norm() < kCarGapM) continue;
     for (const Surface& surface : *body) add(surface, world_->sight_m);
   }
   std::sort(visible_.begin(), visible_.end(), [](const Visible& a, const Visible& b) {
@@ -297,7 +297,7 @@ void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_
   if (out.radiance.width != camera.width_px || out.radiance.height != camera.height_px) {
     out = {RadianceImage(camera.width_px, camera.height_px), InverseDepthImage(camera.width_px, camera.height_px)};
   }
-  std::fill(out.radiance.pixels.begin(), out.radiance.pixels.end(), kHorizonGrey);
+  std::fill(out.radiance.pixels.begin(), out.radiance.pixels.end(), kHorizonGray);
   std::fill(out.inverse_depth.pixels.begin(), out.inverse_depth.pixels.end(), 0.0F);
   const Rigid3 camera_from_world = world_from_camera.Inverse();
   Collect(camera, camera_from_world, time_s);

@@ -13,7 +13,7 @@
 
 namespace tessera {
 
-using RadianceImage = Image<uint16_t>;   // grey values times 256: light that reaches a pixel
+using RadianceImage = Image<uint16_t>;   // gray values times 256: light that reaches a pixel
 using InverseDepthImage = Image<float>;  // 1 / z of the surface in the middle of the pixel, 1/m; 0: nothing there
 
 struct Rendering {
@@ -46,7 +46,7 @@ class Renderer {
   explicit Renderer(std::shared_ptr<const World> world);
   ~Renderer();
 
-  // The world at this time, from this place. Surfaces are drawn from near to far against a buffer of inverse depths;
+  // The world at this time, from this position. Surfaces are drawn from near to far against a buffer of inverse depths;
   // paint is looked up bilinearly in the level whose texels are about as large as a pixel.
   void Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out);
 

@@ -73,8 +73,8 @@ const std::vector<int32_t>& StreetMap::Near(const Eigen::Vector2d& point) const 
   return cells_[static_cast<size_t>(static_cast<int>(offset.y()) * num_columns_ + static_cast<int>(offset.x()))];
 }
 
-StreetPlace StreetMap::PlaceOf(const Eigen::Vector2d& point) const {
-  StreetPlace best;
+StreetPosition StreetMap::PositionOf(const Eigen::Vector2d& point) const {
+  StreetPosition best;
   double best_squared = kReachM * kReachM;
   for (const int32_t index : Near(point)) {
     const Segment& segment = segments_[static_cast<size_t>(index)];
@@ -90,6 +90,6 @@ StreetPlace StreetMap::PlaceOf(const Eigen::Vector2d& point) const {
   return best;
 }
 
-double StreetMap::DistanceToStreet(const Eigen::Vector2d& point) const { return std::abs(PlaceOf(point).lateral_m); }
+double StreetMap::DistanceToStreet(const Eigen::Vector2d& point) const { return std::abs(PositionOf(point).lateral_m); }
 
 }  // namespace tessera

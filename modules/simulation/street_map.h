@@ -7,9 +7,9 @@
 
 namespace tessera {
 
-// Across a street, from its middle: two lanes, parked cars, kerb, pavement, then the lots.
+// Across a street, from its middle: two lanes, parked cars, kurb, pavement, then the lots.
 inline constexpr double kRoadHalfWidthM = 3.5;
-inline constexpr double kKerbM = 5.7;
+inline constexpr double kCurbM = 5.7;
 inline constexpr double kLotLineM = 8.0;
 
 using Polyline = std::vector<Eigen::Vector2d>;
@@ -20,8 +20,8 @@ double LengthOf(const Polyline& line);
 // The unit vector to the right of direction `d` for someone on the ground (y down: x right when looking along z).
 inline Eigen::Vector2d RightOf(const Eigen::Vector2d& d) { return {d.y(), -d.x()}; }
 
-// A place seen from the nearest middle line.
-struct StreetPlace {
+// A position seen from the nearest middle line.
+struct StreetPosition {
   double along_m = 0.0;    // from the beginning of that street
   double lateral_m = 1e3;  // to its right; at least 1e3 if no street is within reach
 };
@@ -33,7 +33,7 @@ class StreetMap {
 
   // Streets farther than kReachM are not looked for.
   static constexpr double kReachM = 24.0;
-  StreetPlace PlaceOf(const Eigen::Vector2d& point) const;
+  StreetPosition PositionOf(const Eigen::Vector2d& point) const;
   double DistanceToStreet(const Eigen::Vector2d& point) const;
 
  private:

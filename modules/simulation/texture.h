@@ -1,4 +1,4 @@
-// Painted surfaces: grey values over a rectangle, with coarser and coarser copies for what is far away.
+// Painted surfaces: gray values over a rectangle, with coarser and coarser copies for what is far away.
 #pragma once
 
 #include <cstdint>

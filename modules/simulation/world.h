@@ -23,7 +23,7 @@ struct Surface {
   float brightness = 1.0F;  // of the light that falls on it
   bool two_sided = false;
 
-  Eigen::Vector3d Centre() const { return corner + 0.5 * (across + up); }
+  Eigen::Vector3d Center() const { return corner + 0.5 * (across + up); }
   // In the order of its outline.
   std::array<Eigen::Vector3d, 4> Corners() const {
     return {corner, corner + across, corner + across + up, corner + up};
@@ -33,7 +33,7 @@ struct Surface {
 // A car that drives along a line, against the camera's direction.
 struct MovingCar {
   Polyline way;          // every kCarStepM
-  double start_m = 0.0;  // its place along the way at time 0
+  double start_m = 0.0;  // its position along the way at time 0
   double speed_mps = 0.0;
   std::vector<Surface> body;  // around the origin, facing +z
 };
@@ -44,7 +44,7 @@ struct World {
   std::vector<Surface> surfaces;
   std::vector<MovingCar> cars;
   std::shared_ptr<const StreetMap> streets;  // null: a room
-  double sight_m = 260.0;                    // surfaces whose centre is farther are not drawn, but `far` ones are
+  double sight_m = 260.0;                    // surfaces whose center is farther are not drawn, but `far` ones are
   std::vector<Surface> far;                  // sky and skyline
 };
 

@@ -40,7 +40,7 @@ struct OfflineRun {
   int num_failures = 0;                                      // changes from tracked to lost
   std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
-  // Places of tracked frames: as known at the time, and after all optimisation.
+  // Poses of tracked frames: as known at the time, and after all optimization.
   std::map<FrameId, Rigid3> Live() const;
   std::map<FrameId, Rigid3> Optimized() const;
 };

@@ -4,7 +4,7 @@
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
-// OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimisation), trajectory_live.txt and
+// OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimization), trajectory_live.txt and
 // ground_truth.txt, TUM rows each.
 #include <algorithm>
 #include <cstdio>

@@ -149,7 +149,7 @@ void BM_PoseGraph(benchmark::State& state) {
   const bool has_scale = state.range(1) != 0;
   const SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = static_cast<int>(state.range(0)),
                                                          .step_m = 2.0,
-                                                         .num_neighbours = 8,
+                                                         .num_neighbors = 8,
                                                          .has_scale = has_scale,
                                                          .rotation_sigma_rad = 0.0003,
                                                          .log_scale_sigma = 0.002,
@@ -168,7 +168,7 @@ BENCHMARK(BM_PoseGraph)
     ->Unit(benchmark::kMillisecond);
 
 // A whole map of range(0) keyframes after its loop was closed: 60 new landmarks a keyframe, each seen by 3 to 7, so
-// that neighbours share about 200; `percent_right` of the observations have a right column.
+// that neighbors share about 200; `percent_right` of the observations have a right column.
 void BM_GlobalBundle(benchmark::State& state) {
   const SyntheticBundle bundle = MakeSyntheticStreet({.num_keyframes = static_cast<int>(state.range(0)),
                                                       .share_with_right = 0.01 * static_cast<double>(state.range(1))});

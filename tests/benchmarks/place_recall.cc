@@ -3,10 +3,10 @@
 //   place_recall SOURCE OUT_DIR VOCABULARY... [key=value]...
 //   place_recall kitti:../shared/data/torcs/g-track-3 /tmp/places config/vocabulary.tvoc spacing=2
 //
-// Frames are taken every `spacing` metres (or `turn` radians). Each asks for the best place among those at least
-// `apart` metres of way before it. Its score is divided by the similarity with the frame before it, what a view of the
+// Frames are taken every `spacing` meters (or `turn` radians). Each asks for the best place among those at least
+// `apart` meters of way before it. Its score is divided by the similarity with the frame before it, what a view of the
 // same place would reach at best (Galvez-Lopez and Tardos 2012, eq. 2). The answer is true if the camera stood within
-// `near` metres and `angle` radians of it. Of all frames that a true answer exists for, recall is the share that got
+// `near` meters and `angle` radians of it. Of all frames that a true answer exists for, recall is the share that got
 // one with a score above the threshold; precision is the share of true ones among all answers above it.
 #include <algorithm>
 #include <cstdio>
@@ -110,7 +110,7 @@ struct Answer {
   FrameId frame;
   FrameId place;             // invalid: none was found
   double score = 0.0;        // similarity with the place
-  double normalised = 0.0;   // divided by the similarity with the view before
+  double normalized = 0.0;   // divided by the similarity with the view before
   double distance_m = -1.0;  // from the place
   bool is_true = false;
   bool has_truth = false;  // some earlier view is the same place
@@ -136,7 +136,7 @@ std::vector<Answer> AskForEach(const std::vector<View>& views, const Vocabulary&
       const BagOfWords& before = *database.Find(KeyframeId{static_cast<int64_t>(i) - 1});
       answer.place = place.frame;
       answer.score = places[0].score;
-      answer.normalised = answer.score / std::max(Similarity(*bag, before), 0.01);
+      answer.normalized = answer.score / std::max(Similarity(*bag, before), 0.01);
       answer.distance_m = (view.world_from_camera.translation - place.world_from_camera.translation).norm();
       answer.is_true = IsSamePlace(view, place, arguments);
     }
@@ -181,9 +181,9 @@ Curve MakeCurve(std::vector<Answer> answers, double Answer::* score) {
 
 void WriteFiles(const std::vector<Answer>& answers, const Curve& curve, const std::filesystem::path& stem) {
   std::ofstream answer_file(stem.string() + "_answers.csv"), curve_file(stem.string() + "_curve.csv");
-  answer_file << "frame,place,score,normalised,distance_m,is_true,has_truth\n";
+  answer_file << "frame,place,score,normalized,distance_m,is_true,has_truth\n";
   for (const Answer& a : answers) {
-    answer_file << a.frame.value << ',' << a.place.value << ',' << a.score << ',' << a.normalised << ',' << a.distance_m
+    answer_file << a.frame.value << ',' << a.place.value << ',' << a.score << ',' << a.normalized << ',' << a.distance_m
                 << ',' << a.is_true << ',' << a.has_truth << '\n';
   }
   curve_file << "threshold,recall,precision\n";
@@ -193,13 +193,13 @@ void WriteFiles(const std::vector<Answer>& answers, const Curve& curve, const st
 
 void Measure(const std::vector<View>& views, const std::string& path, const Arguments& arguments) {
   const std::vector<Answer> answers = AskForEach(views, *Vocabulary::Load(path), arguments);
-  const Curve curve = MakeCurve(answers, &Answer::normalised), raw = MakeCurve(answers, &Answer::score);
+  const Curve curve = MakeCurve(answers, &Answer::normalized), raw = MakeCurve(answers, &Answer::score);
   const auto count = [&](bool Answer::* what) {
     return std::count_if(answers.begin(), answers.end(), [&](const Answer& answer) { return answer.*what; });
   };
   std::printf("%s: views %zu, revisits %td, best place true %td\n", path.c_str(), views.size(),
               count(&Answer::has_truth), count(&Answer::is_true));
-  for (const auto& [name, of] : {std::pair("score / neighbour's", &curve), std::pair("bare score", &raw)}) {
+  for (const auto& [name, of] : {std::pair("score / neighbor's", &curve), std::pair("bare score", &raw)}) {
     std::printf("  %s: recall at 100 %% precision %.3f down to %.3f; best false answer %.3f\n", name, of->sure_recall,
                 of->sure_threshold, of->best_false);
   }

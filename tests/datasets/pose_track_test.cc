@@ -7,7 +7,7 @@ namespace {
 
 constexpr int64_t kMs = 1'000'000;
 
-TEST(PoseTrack, InterpolatesBetweenNeighbours) {
+TEST(PoseTrack, InterpolatesBetweenNeighbors) {
   PoseTrack track;
   track.Add(10 * kMs, {ExpSO3({0.0, 0.0, 0.2}), {1.0, 0.0, 0.0}});
   track.Add(20 * kMs, {ExpSO3({0.0, 0.0, 0.4}), {3.0, 2.0, 0.0}});

@@ -26,11 +26,11 @@ Eigen::Vector2d ProjectDistorted(const PinholeCamera& camera, const Eigen::Vecto
           camera.fy_px * (y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y) + camera.cy_px};
 }
 
-GrayImage DrawSpot(const PinholeCamera& camera, const Eigen::Vector2d& centre) {
+GrayImage DrawSpot(const PinholeCamera& camera, const Eigen::Vector2d& center) {
   GrayImage image(camera.width_px, camera.height_px);
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
-      const double distance2 = (Eigen::Vector2d(x, y) - centre).squaredNorm();
+      const double distance2 = (Eigen::Vector2d(x, y) - center).squaredNorm();
       image.row(y)[x] = static_cast<uint8_t>(std::lround(250.0 * std::exp(-distance2 / 32.0)));
     }
   }

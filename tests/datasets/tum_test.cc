@@ -7,7 +7,7 @@ namespace {
 
 class TumTest : public testing::Test {
  protected:
-  // Colour at 0, 33, 67 and 100 ms; depth with offsets; the third has no depth within 20 ms.
+  // Color at 0, 33, 67 and 100 ms; depth with offsets; the third has no depth within 20 ms.
   TumTest() {
     const std::vector<std::string> color = {"1000.000000", "1000.033000", "1000.067000", "1000.100000"};
     const std::vector<std::string> depth = {"1000.004000", "1000.030000", "1000.095000", "1000.118000"};
@@ -57,7 +57,7 @@ TEST_F(TumTest, PairsImagesThatAreEachOthersNearest) {
     EXPECT_EQ(frame->left, ToGray(DatasetFolder::Pattern(640, 480, i < 2 ? i : 3)));
     EXPECT_EQ(frame->depth.row(100)[100], 1000 + i);
   }
-  EXPECT_NE(Joined(source->notes()).find("1 colour images without a depth image"), std::string::npos);
+  EXPECT_NE(Joined(source->notes()).find("1 color images without a depth image"), std::string::npos);
   EXPECT_EQ(OpenSource(Options(SensorType::kMono))->num_frames(), 4);
 }
 
@@ -81,7 +81,7 @@ TEST_F(TumTest, FallsBackOnTheUsualKinectWithAWarning) {
 
 TEST_F(TumTest, TakesTheCalibrationFromReadmeThenFileThenOption) {
   folder_.Write("README",
-                "RGB-D, depth in millimetres (factor 1000; the TUM sets use 5000), pinhole fx=fy=585 cx=320 cy=240.");
+                "RGB-D, depth in millimeters (factor 1000; the TUM sets use 5000), pinhole fx=fy=585 cx=320 cy=240.");
   auto source = OpenSource(Options());
   EXPECT_EQ(source->calibration().fy_px, 585.0);
   EXPECT_EQ(source->calibration().depth_unit_m, 0.001);
@@ -134,6 +134,7 @@ TEST(ReadmeCalibration, FindsChainsAndSpaces) {
   EXPECT_FALSE(PinholeFromText("fx=0 fy=2 cx=3 cy=4"));
   EXPECT_FALSE(PinholeFromText(""));
   EXPECT_EQ(DepthUnitFromText("Depth in millimeters."), 0.001);
+  EXPECT_EQ(DepthUnitFromText("Depth in millimetres."), 0.001);
   EXPECT_EQ(DepthUnitFromText("scaled by a factor of"), 0.0);
   EXPECT_EQ(DepthUnitFromText("factor: 5000"), 1.0 / 5000.0);
 }

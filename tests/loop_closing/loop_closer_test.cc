@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "mapping/map_bending.h"
+#include "mapping/map_correction.h"
 #include "support/synthetic_world.h"
 
 namespace tessera {
@@ -86,7 +86,7 @@ TEST(LoopCloser, FindsWhereItIsUpToTheScaleOfTheMap) {
     }
     EXPECT_EQ(num_right, loop.seen.size());
     EXPECT_GE(loop.seen.size(), 45U);
-    // And the mapper, which bends the map so, has one place.
+    // The mapper, which applies these corrections, then has one place.
     MapEditor editor(planted.map());
     CloseLoop(loop, {}, editor);
     (void)editor.Finish(current);
@@ -223,7 +223,7 @@ TEST(LoopCloser, CulledKeyframesAreNoPlacesAnyMore) {
   editor.RemoveKeyframe(matched);
   ASSERT_EQ(closer.ApplyDelta(editor.Finish({2 * kVisit - 1})), "");
   const LoopResult loop = closer.FindLoop({2 * kVisit - 1});
-  ASSERT_TRUE(loop.matched.valid()) << "its neighbours show the place as well";
+  ASSERT_TRUE(loop.matched.valid()) << "its neighbors show the place as well";
   EXPECT_NE(loop.matched, matched);
   MapEditor rest(planted.map());
   for (int64_t k = 0; k < kVisit; ++k) {
@@ -241,9 +241,9 @@ TEST(Relocalization, FindsACameraInEachUnitOfTheMap) {
     SyntheticWorld world(scale == 1.0 ? SensorType::kStereo : SensorType::kMono, 0.3);
     PlantedMap planted(world);
     for (int64_t k = 0; k < kVisit; ++k) planted.Add(2 * k, {k - 1}, 0, Away(scale));
-    if (scale != 1.0) {  // the map was bent since: what was measured before is in other units
+    if (scale != 1.0) {  // the map was corrected since: older measurements are in other units
       MapEditor editor(planted.map());
-      BendMap({{{0}, Away(0.7)}}, editor);
+      ApplyCorrections({{{0}, Away(0.7)}}, editor);
       (void)editor.Finish({kVisit - 1});
     }
     LoopCloser closer(ShippedVocabulary(), {});

@@ -9,7 +9,7 @@
 
 #include "map/map_editor.h"
 #include "map/spanning_tree.h"
-#include "mapping/map_bending.h"
+#include "mapping/map_correction.h"
 #include "support/synthetic_problems.h"
 
 namespace tessera {
@@ -36,11 +36,10 @@ Map MapOf(const SyntheticCircuit& circuit, SensorType sensor) {
 
 VerifiedPlace LoopOf(const SyntheticCircuit& circuit) { return {{0}, circuit.problem.edges.back().to_from_from, {}}; }
 
-std::vector<Sim3> PlacesOf(const Map& map) {
-  std::vector<Sim3> places;
-  map.keyframes().ForEach(
-      [&](KeyframeId, const Keyframe& keyframe) { places.push_back(keyframe.WorldFromKeyframe()); });
-  return places;
+std::vector<Sim3> KeyframePoses(const Map& map) {
+  std::vector<Sim3> poses;
+  map.keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) { poses.push_back(keyframe.WorldFromKeyframe()); });
+  return poses;
 }
 
 TEST(LoopCorrection, SpreadsTheErrorOfALoopOverTheRing) {
@@ -51,23 +50,23 @@ TEST(LoopCorrection, SpreadsTheErrorOfALoopOverTheRing) {
     options.log_scale_drift = options.has_scale ? 0.3 : 0.0;
     const SyntheticCircuit circuit = MakeSyntheticCircuit(options);
     Map map = MapOf(circuit, sensor);
-    const std::vector<Sim3> before = PlacesOf(map);
+    const std::vector<Sim3> before = KeyframePoses(map);
     const KeyframeId current{119};
     const VerifiedPlace place = LoopOf(circuit);
-    const auto corrections = CorrectMap(map, current, place, {});
+    const auto corrections = ComputeCorrections(map, current, place, {});
     ASSERT_EQ(corrections.size(), 120U);
-    Corrections bend;
+    Corrections by_keyframe;
     for (size_t i = 0; i < corrections.size(); ++i) {
       EXPECT_EQ(corrections[i].id, KeyframeId{static_cast<int64_t>(i)});
-      bend[corrections[i].id] = corrections[i].new_world_from_old;
+      by_keyframe[corrections[i].id] = corrections[i].new_world_from_old;
       if (!options.has_scale) {
         EXPECT_NEAR(corrections[i].new_world_from_old.scale, 1.0, 1e-12);
       }
     }
     MapEditor editor(map);
-    BendMap(bend, editor);
+    ApplyCorrections(by_keyframe, editor);
     (void)editor.Finish(current);
-    const std::vector<Sim3> after = PlacesOf(map);
+    const std::vector<Sim3> after = KeyframePoses(map);
     EXPECT_LT((after[0].translation - before[0].translation).norm(), 1e-12) << "the root stays";
     EXPECT_LT(CircuitError(circuit, after, 1.0), 0.4 * CircuitError(circuit, before, 1.0)) << ToString(sensor);
     // The ends meet, and no step gives way by more than a few parts of a hundred.
@@ -117,13 +116,13 @@ TEST(LoopCorrection, JoinsTwoParts) {
     const KeyframeId current = is_found_in_later ? KeyframeId{3} : KeyframeId{5};
     const KeyframeId matched = is_found_in_later ? KeyframeId{1} : KeyframeId{3};
     const Sim3 measured{1.4, ExpSO3({0.0, 0.3, 0.1}), {0.5, 0.0, 0.2}};
-    const auto corrections = CorrectMap(map, current, {matched, measured, {}}, {});
+    const auto corrections = ComputeCorrections(map, current, {matched, measured, {}}, {});
     ASSERT_EQ(corrections.size(), 2U);
     EXPECT_EQ(corrections[0].id, KeyframeId{2});
     EXPECT_EQ(corrections[1].id, KeyframeId{3});
-    MapEditor bending(map);
-    BendMap({{{2}, corrections[0].new_world_from_old}, {{3}, corrections[1].new_world_from_old}}, bending);
-    (void)bending.Finish({5});
+    MapEditor correction(map);
+    ApplyCorrections({{{2}, corrections[0].new_world_from_old}, {{3}, corrections[1].new_world_from_old}}, correction);
+    (void)correction.Finish({5});
     const Sim3 joined =
         map.FindKeyframe(matched)->WorldFromKeyframe().Inverse() * map.FindKeyframe(current)->WorldFromKeyframe();
     EXPECT_NEAR(joined.scale, measured.scale, 1e-12);

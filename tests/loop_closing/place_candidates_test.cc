@@ -60,14 +60,14 @@ class PlantedPlaces {
 
 // Keyframes 0 .. 4 are one place, 5 .. 9 a way, on which each looks different and shares landmarks with the next, and
 // 10 .. 12 look like the place again, keyframe 12 most like keyframe 2.
-PlantedPlaces RoundTrip(int num_alike_witnesses = 2) {
+PlantedPlaces RoundTrip(int num_alike_before = 2) {
   PlantedPlaces places;
   for (const int num_other : {2, 1, 0, 1, 2}) places.Add(TenWords(0, num_other));
   places.Share({0, 1, 2, 3, 4}, 30);
   for (int32_t i = 0; i < 5; ++i) places.Add(TenWords(100 + 20 * i));
   for (int64_t k = 4; k < 9; ++k) places.Share({k, k + 1}, 20);
-  places.Add(num_alike_witnesses >= 2 ? TenWords(0, 3, 7) : TenWords(300, 3, 7));
-  places.Add(num_alike_witnesses >= 1 ? TenWords(0, 2, 7) : TenWords(300, 2, 7));
+  places.Add(num_alike_before >= 2 ? TenWords(0, 3, 7) : TenWords(300, 3, 7));
+  places.Add(num_alike_before >= 1 ? TenWords(0, 2, 7) : TenWords(300, 2, 7));
   places.Add(TenWords(0));
   places.Share({10, 11, 12}, 30);
   return places;
@@ -80,17 +80,17 @@ TEST(PlaceCandidates, APlaceSeenAgainIsNamedByItsBestKeyframe) {
   EXPECT_EQ(found.keyframes, (std::vector<KeyframeId>{{2}}));
 }
 
-TEST(PlaceCandidates, WitnessesMustAgree) {
+TEST(PlaceCandidates, KeyframesBeforeMustHaveTheSamePlace) {
   for (const int num_alike : {0, 1}) {
     const Candidates found = RoundTrip(num_alike).Find(12);
     EXPECT_TRUE(found.keyframes.empty()) << num_alike;
   }
   CandidateOptions lax;
-  lax.num_witnesses = 0;
+  lax.num_consistent = 0;
   EXPECT_EQ(RoundTrip(2).Find(12, lax).keyframes.size(), 1U);
 }
 
-TEST(PlaceCandidates, TooFewKeyframesBeforeCantWitness) {
+TEST(PlaceCandidates, TooFewKeyframesBeforeAreNotConsistent) {
   PlantedPlaces places;
   for (int i = 0; i < 3; ++i) places.Add(TenWords(0));
   places.Share({0, 1, 2}, 30);
@@ -99,28 +99,28 @@ TEST(PlaceCandidates, TooFewKeyframesBeforeCantWitness) {
   places.Share({3, 4}, 30);
   const Candidates found = places.Find(4);
   EXPECT_EQ(found.num_found, 1);
-  EXPECT_TRUE(found.keyframes.empty()) << "keyframe 3 alone can't say that the likeness lasts";
+  EXPECT_TRUE(found.keyframes.empty()) << "keyframe 3 alone does not show that the similarity lasts";
 }
 
-TEST(PlaceCandidates, NeighboursAndTheirNeighboursAreNoCandidates) {
+TEST(PlaceCandidates, NeighborsAndTheirNeighborsAreNoCandidates) {
   PlantedPlaces places;
   for (int i = 0; i < 6; ++i) places.Add(TenWords(0));
   places.Share({0, 1, 2}, 30);
   places.Share({2, 3}, 30);
   places.Share({3, 4, 5}, 30);
   EXPECT_EQ(places.Find(3).num_found, 0);
-  // Keyframe 2 is a neighbour of a neighbour; 0 and 1 are one step farther.
+  // Keyframe 2 is a neighbor of a neighbor; 0 and 1 are one step farther.
   CandidateOptions lax;
-  lax.num_witnesses = 0;
+  lax.num_consistent = 0;
   const Candidates found = places.Find(5, lax);
   for (const KeyframeId id : found.keyframes) EXPECT_TRUE(id == KeyframeId{0} || id == KeyframeId{1}) << id.value;
   EXPECT_FALSE(found.keyframes.empty());
-  lax.min_shared_landmarks = 31;  // then they share too little to be neighbours
+  lax.min_shared_landmarks = 31;  // then they share too little to be neighbors
   EXPECT_GT(places.Find(5, lax).num_found, 0);
   EXPECT_EQ(places.Find(5, lax).keyframes.front(), KeyframeId{0});
 }
 
-TEST(PlaceCandidates, WhatLooksLessAlikeThanANeighbourIsNone) {
+TEST(PlaceCandidates, WhatLooksLessAlikeThanANeighborIsNone) {
   PlantedPlaces places = RoundTrip();
   EXPECT_EQ(places.Find(12).num_found, 1);
   PlantedPlaces other;
@@ -128,7 +128,7 @@ TEST(PlaceCandidates, WhatLooksLessAlikeThanANeighbourIsNone) {
   other.Share({0, 1, 2}, 30);
   for (const int num_other : {2, 1, 0}) other.Add(TenWords(0, num_other, 7));
   other.Share({3, 4, 5}, 30);
-  EXPECT_EQ(other.Find(5).num_found, 0) << "six words in common, where the neighbours have eight";
+  EXPECT_EQ(other.Find(5).num_found, 0) << "six words in common, where the neighbors have eight";
 }
 
 TEST(PlaceCandidates, LaterKeyframesDoNotChangeTheAnswer) {

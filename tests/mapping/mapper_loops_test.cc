@@ -80,7 +80,7 @@ class LoopMapper : public testing::Test {
   MapDelta delta_;
 };
 
-TEST_F(LoopMapper, ADueLoopBendsTheMapBeforeTheKeyframeComesIn) {
+TEST_F(LoopMapper, ADueLoopCorrectsTheMapBeforeTheKeyframeIsInserted) {
   Step();
   const LoopResult loop = LoopAt({11}, {5});
   EXPECT_FALSE(Step().asks_adjustment);
@@ -99,8 +99,8 @@ TEST_F(LoopMapper, ADueLoopBendsTheMapBeforeTheKeyframeComesIn) {
   EXPECT_FALSE(Step().asks_adjustment) << "one is on its way";
 }
 
-// What was found before the map was bent speaks of a map that is no more.
-TEST_F(LoopMapper, ALoopFoundOnAMapThatWasBentMeanwhileIsVoid) {
+// It was measured against poses that are gone.
+TEST_F(LoopMapper, ALoopFoundBeforeTheLastCorrectionIsIgnored) {
   Step();
   const LoopResult first = LoopAt({11}, {5});
   Step();
@@ -159,17 +159,17 @@ TEST_F(LoopMapper, AnAdjustmentThatIsOfNoUseChangesNothing) {
   EXPECT_FALSE(delta.has_value());
 }
 
-TEST_F(LoopMapper, AtTheEndTheMapIsBentOnceMore) {
+TEST_F(LoopMapper, AtTheEndTheMapIsCorrectedOnceMore) {
   Step();
   EXPECT_FALSE(mapper_.Finish({}).has_value());
   const LoopResult loop = LoopAt({12}, {5});
-  const std::optional<MapDelta> bent = mapper_.Finish({{loop}, {}});
-  ASSERT_TRUE(bent.has_value());
-  EXPECT_TRUE(bent->asks_adjustment);
-  EXPECT_EQ(bent->answers, KeyframeId{12});
-  EXPECT_TRUE(bent->new_keyframes.empty());
-  EXPECT_EQ(replica_.Apply(*bent), "");
-  const GlobalAdjustment adjustment = AdjustGlobally(replica_, bent->answers, GlobalBundleOptions());
+  const std::optional<MapDelta> corrected = mapper_.Finish({{loop}, {}});
+  ASSERT_TRUE(corrected.has_value());
+  EXPECT_TRUE(corrected->asks_adjustment);
+  EXPECT_EQ(corrected->answers, KeyframeId{12});
+  EXPECT_TRUE(corrected->new_keyframes.empty());
+  EXPECT_EQ(replica_.Apply(*corrected), "");
+  const GlobalAdjustment adjustment = AdjustGlobally(replica_, corrected->answers, GlobalBundleOptions());
   const std::optional<MapDelta> adjusted = mapper_.Finish({{}, adjustment});
   ASSERT_TRUE(adjusted.has_value());
   EXPECT_FALSE(adjusted->asks_adjustment);

@@ -109,7 +109,7 @@ TEST(AdjustBundle, WindowSolverTakesTheStepsOfCeres) {
   }
 }
 
-// After a loop the error that is left bends the whole street: metres, for a millionth of the cost.
+// After a loop the error that is left deforms the whole street: meters, for a millionth of the cost.
 TEST(AdjustBundle, StraightensAStreetAfterItsLoop) {
   const SyntheticBundle bundle = MakeSyntheticStreet({.num_keyframes = 150, .num_new_landmarks = 30});
   const auto rms = [&](const std::vector<Rigid3>& camera_from_world) {

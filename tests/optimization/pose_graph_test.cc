@@ -54,7 +54,7 @@ TEST(OptimizePoseGraph, LongChainsConvergeInTheIterationsGiven) {
   for (const int num_keyframes : {300, 1000, 3000}) {
     const SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = num_keyframes,
                                                            .step_m = 2.0,
-                                                           .num_neighbours = 2,
+                                                           .num_neighbors = 2,
                                                            .rotation_sigma_rad = 0.0003,
                                                            .log_scale_sigma = 0.002,
                                                            .log_scale_drift = 0.5});
@@ -78,8 +78,8 @@ TEST(OptimizePoseGraph, WithoutALoopNothingMoves) {
 }
 
 TEST(OptimizePoseGraph, TheMapsUnitDoesNotMatter) {
-  const SyntheticCircuit metres = MakeSyntheticCircuit({.unit = 1.0});
-  const auto expected = OptimizePoseGraph(metres.problem, Exhaustive());
+  const SyntheticCircuit meters = MakeSyntheticCircuit({.unit = 1.0});
+  const auto expected = OptimizePoseGraph(meters.problem, Exhaustive());
   ASSERT_TRUE(expected.has_value());
   for (const double unit : {0.01, 7.0, 1000.0}) {
     const SyntheticCircuit circuit = MakeSyntheticCircuit({.unit = unit});

@@ -35,7 +35,7 @@ std::string DigestOf(const BundleResult& result) {
 }
 
 TEST(Repeatability, PoseGraph) {
-  const SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = 500, .num_neighbours = 6});
+  const SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = 500, .num_neighbors = 6});
   const auto first = OptimizePoseGraph(circuit.problem, {});
   const std::vector<double> moves_the_heap(12345, 1.0);
   const auto second = OptimizePoseGraph(PoseGraphProblem(circuit.problem), {});

@@ -31,7 +31,7 @@ double SumOfWeights(const BagOfWords& bag) {
   return sum;
 }
 
-TEST_F(VocabularyTest, BagsAreNormalisedAndSorted) {
+TEST_F(VocabularyTest, BagsAreNormalizedAndSorted) {
   const BagOfWords bag = Random().Describe(RandomDescriptors(200, 1));
   EXPECT_NEAR(SumOfWeights(bag), 1.0, 1e-6);
   for (size_t i = 0; i < bag.words.size(); ++i) {

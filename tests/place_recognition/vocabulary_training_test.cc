@@ -11,7 +11,7 @@
 namespace tessera {
 namespace {
 
-// Images that hold one noisy copy of each centre.
+// Images that hold one noisy copy of each center.
 std::vector<std::vector<Descriptor>> ImagesAround(const std::vector<Descriptor>& centers, int num_images,
                                                   int num_flips) {
   std::mt19937_64 generator(99);
@@ -27,7 +27,7 @@ TEST(VocabularyTraining, FindsPlantedClusters) {
   const VocabularyTree tree =
       TrainVocabulary(ImagesAround(planted, 41, 20), {.num_children = 8, .num_levels = 1, .direct_level = 0});
   ASSERT_EQ(tree.num_children.size(), 9U);
-  // Each centre is the majority of 41 copies, in each of which a bit is wrong with a chance of 20 in 256.
+  // Each center is the majority of 41 copies, in each of which a bit is wrong with a chance of 20 in 256.
   const std::set<Descriptor> found(tree.centers.begin() + 1, tree.centers.end());
   EXPECT_EQ(found, std::set<Descriptor>(planted.begin(), planted.end()));
 }

@@ -66,25 +66,25 @@ TEST(Simulation, SeedsMakeDifferentWorlds) {
   EXPECT_NE(HashOfFrame(one.Render(FrameId{0})), HashOfFrame(two.Render(FrameId{0})));
 }
 
-// Grey value (0..255) and inverse depth between pixels.
+// Gray value (0..255) and inverse depth between pixels.
 struct Sample {
-  double grey, inverse_depth, contrast;
+  double gray, inverse_depth, contrast;
 };
 Sample SampleAt(const Rendering& r, const Eigen::Vector2d& p) {
   const int x = static_cast<int>(p.x()), y = static_cast<int>(p.y());
   const double u = p.x() - x, v = p.y() - y;
-  const auto grey = [&](int i, int j) { return r.radiance.row(y + j)[x + i] / 256.0; };
-  const double low = std::min({grey(0, 0), grey(1, 0), grey(0, 1), grey(1, 1)});
-  const double high = std::max({grey(0, 0), grey(1, 0), grey(0, 1), grey(1, 1)});
-  return {(1 - v) * ((1 - u) * grey(0, 0) + u * grey(1, 0)) + v * ((1 - u) * grey(0, 1) + u * grey(1, 1)),
+  const auto gray = [&](int i, int j) { return r.radiance.row(y + j)[x + i] / 256.0; };
+  const double low = std::min({gray(0, 0), gray(1, 0), gray(0, 1), gray(1, 1)});
+  const double high = std::max({gray(0, 0), gray(1, 0), gray(0, 1), gray(1, 1)});
+  return {(1 - v) * ((1 - u) * gray(0, 0) + u * gray(1, 0)) + v * ((1 - u) * gray(0, 1) + u * gray(1, 1)),
           static_cast<double>(
               r.inverse_depth.row(static_cast<int>(std::lround(p.y())))[static_cast<int>(std::lround(p.x()))]),
           high - low};
 }
 
 // Sends every pixel of one picture by its depth into another; where the other sees the same place, it must see the same
-// grey, but for what lies between its own pixels. Returns the share of pixels that were compared.
-double ExpectSameGrey(const CameraCalibration& camera, const Rendering& from, const Rendering& to,
+// gray, but for what lies between its own pixels. Returns the share of pixels that were compared.
+double ExpectSameGray(const CameraCalibration& camera, const Rendering& from, const Rendering& to,
                       const Rigid3& to_from_from) {
   int num_compared = 0, num_different = 0;
   double sum_squared = 0.0;
@@ -98,7 +98,7 @@ double ExpectSameGrey(const CameraCalibration& camera, const Rendering& from, co
       if (p.x() < 1 || p.y() < 1 || p.x() > camera.width_px - 3 || p.y() > camera.height_px - 3) continue;
       const Sample sample = SampleAt(to, p);
       if (std::abs(sample.inverse_depth * point.z() - 1.0) > 0.02) continue;  // hidden by something nearer
-      const double difference = sample.grey - from.radiance.row(y)[x] / 256.0;
+      const double difference = sample.gray - from.radiance.row(y)[x] / 256.0;
       ++num_compared;
       sum_squared += difference * difference;
       num_different += std::abs(difference) > 8.0 + sample.contrast ? 1 : 0;
@@ -118,7 +118,7 @@ TEST(Simulation, DepthAndPoseExplainTheNextImage) {
       simulation.RenderPerfect(FrameId{number + 1}, to);
       const Rigid3 to_from_from =
           simulation.WorldFromCamera(FrameId{number + 1}).Inverse() * simulation.WorldFromCamera(FrameId{number});
-      EXPECT_GT(ExpectSameGrey(simulation.calibration(), from, to, to_from_from), 0.5) << scene.name << " " << number;
+      EXPECT_GT(ExpectSameGray(simulation.calibration(), from, to, to_from_from), 0.5) << scene.name << " " << number;
     }
   }
 }
@@ -136,7 +136,7 @@ TEST(Simulation, NoiseIsAsOrdered) {
   }
   const auto num = static_cast<double>(a.pixels.size());
   EXPECT_NEAR(sum / num, 0.0, 0.1);
-  // Read noise 2.6, and shot noise of about 0.048 per grey value of some 100.
+  // Read noise 2.6, and shot noise of about 0.048 per gray value of some 100.
   EXPECT_NEAR(std::sqrt(sum_squared / num), std::sqrt(2.6 * 2.6 + 0.048 * 100.0), 0.6);
 }
 
@@ -166,7 +166,7 @@ TEST(ParseSimulation, ReadsOptions) {
 TEST(ParseSimulation, RefusesNonsense) {
   for (const char* text :
        {"", "moon", "street,", "street,seed", "street,seed=x", "street,seed=-1", "street,speed=0", "street,noise=-1",
-        "street,scale=100", "room,colour=1", "street,length=nan", "street,seed=3 "}) {
+        "street,scale=100", "room,color=1", "street,length=nan", "street,seed=3 "}) {
     EXPECT_THROW(ParseSimulation(text), InputError) << text;
   }
   EXPECT_THROW(Simulation(ParseSimulation("street,path=/nowhere"), SensorType::kMono), InputError);

@@ -27,17 +27,17 @@ TEST(DefaultSettings, OfTheTracker) {
 TEST(DefaultSettings, OfTheMapper) {
   const Settings settings = Defaults();
   const MapperOptions options;
-  EXPECT_EQ(settings.Get<int>("mapper.creation_neighbours"), options.creation.max_neighbours);
+  EXPECT_EQ(settings.Get<int>("mapper.creation_neighbours"), options.creation.max_neighbors);
   EXPECT_EQ(settings.Get<double>("mapper.min_parallax_rad"), options.creation.min_parallax_rad);
   EXPECT_EQ(settings.Get<int>("mapper.max_hamming"), options.creation.max_hamming);
   EXPECT_EQ(settings.Get<int>("mapper.max_hamming"), options.fusion.max_hamming);
-  EXPECT_EQ(settings.Get<int>("mapper.fusion_neighbours"), options.fusion.max_neighbours);
+  EXPECT_EQ(settings.Get<int>("mapper.fusion_neighbours"), options.fusion.max_neighbors);
   EXPECT_EQ(settings.Get<int>("mapper.min_shared_landmarks"), options.window.min_shared_landmarks);
   EXPECT_EQ(settings.Get<int>("mapper.max_inner_keyframes"), options.window.max_inner_keyframes);
   EXPECT_EQ(settings.Get<int>("mapper.max_outer_keyframes"), options.window.max_outer_keyframes);
   EXPECT_EQ(settings.Get<bool>("mapper.always_ceres"), options.bundle.is_always_ceres);
   EXPECT_EQ(settings.Get<int>("mapper.bundle_iterations"), options.bundle.max_num_iterations);
-  EXPECT_EQ(settings.Get<double>("mapper.redundant_share"), options.culling.redundant_share);
+  EXPECT_EQ(settings.Get<double>("mapper.redundant_share"), options.keyframe_culling.redundant_share);
 }
 
 TEST(DefaultSettings, OfLoops) {

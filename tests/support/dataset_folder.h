@@ -39,7 +39,7 @@ class DatasetFolder {
   }
   void Truncate(const std::string& name, size_t num_bytes) const { Write(name, Read(name).substr(0, num_bytes)); }
 
-  // A grey image whose pixels tell where they are and which image it is.
+  // A gray image whose pixels tell where they are and which image it is.
   static cv::Mat Pattern(int width, int height, int seed) {
     cv::Mat image(height, width, CV_8U);
     for (int y = 0; y < height; ++y) {

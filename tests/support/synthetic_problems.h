@@ -107,13 +107,13 @@ inline SyntheticBundle MakeSyntheticBundle(const SyntheticBundleOptions& options
 struct SyntheticCircuitOptions {
   int num_keyframes = 300;
   double step_m = 1.0;                // from keyframe to keyframe
-  int num_neighbours = 3;             // keyframes before, that each has an edge to
+  int num_neighbors = 3;             // keyframes before, that each has an edge to
   bool has_scale = true;              // else the odometry's scale does not drift
   double rotation_sigma_rad = 0.001;  // of odometry, a step
   double translation_sigma = 0.01;    // a step, as a part of it
   double log_scale_sigma = 0.005;     // a step: of the random walk of the scale
   double log_scale_drift = 0.0;       // over the whole circuit
-  double unit = 1.0;                  // of the map, per metre
+  double unit = 1.0;                  // of the map, per meter
   bool has_loop = true;
   uint64_t seed = 1;
 };
@@ -150,7 +150,7 @@ inline SyntheticCircuit MakeSyntheticCircuit(const SyntheticCircuitOptions& opti
   SyntheticCircuit circuit;
   std::vector<PoseGraphNode>& nodes = circuit.problem.nodes;
   circuit.problem.has_scale = options.has_scale;
-  std::vector<double> units;  // of the map around each keyframe, per metre
+  std::vector<double> units;  // of the map around each keyframe, per meter
   const Rigid3 first = CircuitPose(options, 0);
   for (int i = 0; i < options.num_keyframes; ++i) {
     const Rigid3 true_pose = first.Inverse() * CircuitPose(options, i);
@@ -176,13 +176,13 @@ inline SyntheticCircuit MakeSyntheticCircuit(const SyntheticCircuitOptions& opti
   std::vector<Sim3> odometry;
   for (const PoseGraphNode& node : nodes) odometry.push_back(node.world_from_keyframe);
   for (int i = 0; i < options.num_keyframes; ++i) {
-    for (int j = std::max(0, i - options.num_neighbours); j < i; ++j) add_edge(j, i, odometry);
+    for (int j = std::max(0, i - options.num_neighbors); j < i; ++j) add_edge(j, i, odometry);
   }
   if (options.has_loop) add_edge(options.num_keyframes - 1, 0, circuit.world_from_keyframe);
   return circuit;
 }
 
-// Root mean square distance of the keyframes' centres from the truth after the best similarity, in metres.
+// Root mean square distance of the keyframes' centers from the truth after the best similarity, in meters.
 inline double CircuitError(const SyntheticCircuit& circuit, const std::vector<Sim3>& world_from_keyframe, double unit) {
   std::vector<Eigen::Vector3d> estimated, truth;
   for (size_t i = 0; i < world_from_keyframe.size(); ++i) {

@@ -26,7 +26,7 @@ class SyntheticWorld {
   const Eigen::Vector3d& point(size_t i) const { return points_[i]; }
   size_t num_points() const { return points_.size(); }
 
-  // True world_from_camera at a step: half a metre forward each, on a slight bend.
+  // True world_from_camera at a step: half a meter forward each, on a slight bend.
   static Rigid3 Pose(double step);
 
   struct Picture {

@@ -12,10 +12,10 @@ namespace {
 
 MapperOptions OptionsFrom(const Settings& settings) {
   MapperOptions options;
-  options.creation.max_neighbours = settings.Get<int>("mapper.creation_neighbours");
+  options.creation.max_neighbors = settings.Get<int>("mapper.creation_neighbours");
   options.creation.min_parallax_rad = settings.Get<double>("mapper.min_parallax_rad");
   options.creation.max_hamming = settings.Get<int>("mapper.max_hamming");
-  options.fusion.max_neighbours = settings.Get<int>("mapper.fusion_neighbours");
+  options.fusion.max_neighbors = settings.Get<int>("mapper.fusion_neighbours");
   options.fusion.max_hamming = settings.Get<int>("mapper.max_hamming");
   options.window.min_shared_landmarks = settings.Get<int>("mapper.min_shared_landmarks");
   options.window.max_inner_keyframes = settings.Get<int>("mapper.max_inner_keyframes");
@@ -23,7 +23,7 @@ MapperOptions OptionsFrom(const Settings& settings) {
   options.window.is_double = settings.Get<bool>("mapper.double_window");
   options.bundle.is_always_ceres = settings.Get<bool>("mapper.always_ceres");
   options.bundle.max_num_iterations = settings.Get<int>("mapper.bundle_iterations");
-  options.culling.redundant_share = settings.Get<double>("mapper.redundant_share");
+  options.keyframe_culling.redundant_share = settings.Get<double>("mapper.redundant_share");
   if (const std::string problem = options.Check(); !problem.empty()) {
     throw InputError("mapper: " + problem);
   }

@@ -81,7 +81,7 @@ def plot(measured: list[Measured], path: Path) -> None:
         for mask, color, label in ((~is_true, "tab:red", "another place"), (is_true, "tab:green", "the same place")):
             score_axes.plot(
                 each.answers["frame"][mask],
-                each.answers["normalised"][mask],
+                each.answers["normalized"][mask],
                 ".",
                 color=color,
                 markersize=3,

@@ -1,4 +1,4 @@
-#include "mapping/map_bending.h"
+#include "mapping/map_correction.h"
 
 #include <set>
 #include <vector>
@@ -10,8 +10,8 @@
 namespace tessera {
 namespace {
 
-// Corrections of all keyframes that move.
-Corrections Complete(const Map& map, const Corrections& given) {
+// The given corrections, and those that their descendants take over.
+Corrections WithDescendants(const Map& map, const Corrections& given) {
   Corrections all = given;
   map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
     if (given.contains(id)) return;
@@ -25,8 +25,8 @@ Corrections Complete(const Map& map, const Corrections& given) {
   return all;
 }
 
-// The keyframe sees the landmarks of the older place; what it knew under another name is merged into them.
-void SeeOlderPlace(const LoopResult& loop, MapEditor& editor) {
+// The loop's keyframe observes the landmarks of the first visit; its own duplicates are merged into them.
+void ObserveFirstVisit(const LoopResult& loop, MapEditor& editor) {
   const Map& map = editor.map();
   for (const SeenLandmark& seen : loop.seen) {
     const Keyframe& keyframe = *map.FindKeyframe(loop.answers);
@@ -43,11 +43,31 @@ void SeeOlderPlace(const LoopResult& loop, MapEditor& editor) {
   }
 }
 
+// Where the loop joins two parts of the map, the tree of the younger root hangs below the other.
+void JoinTrees(const LoopResult& loop, MapEditor& editor) {
+  const Map& map = editor.map();
+  const KeyframeId current_root = RootOf(map, loop.answers), matched_root = RootOf(map, loop.matched);
+  if (current_root > matched_root) HangBelow(loop.answers, loop.matched, editor);
+  if (current_root < matched_root) HangBelow(loop.matched, loop.answers, editor);
+}
+
+// Landmarks that both visits created become one.
+void FuseVisits(const LoopResult& loop, const LoopFusionOptions& options, MapEditor& editor) {
+  const Map& map = editor.map();
+  const std::vector<KeyframeId> older = KeyframesAround(map, loop.matched, options.num_neighbors);
+  const std::vector<KeyframeId> around_current = KeyframesAround(map, loop.answers, options.num_neighbors);
+  std::set<KeyframeId> newer(around_current.begin(), around_current.end());
+  const std::vector<LandmarkId> older_landmarks = LandmarksSeenBy(map, older);
+  ObserveFirstVisit(loop, editor);
+  for (const KeyframeId id : older) newer.erase(id);
+  ProjectLandmarks(newer, older_landmarks, options.search, editor);
+}
+
 }  // namespace
 
-void BendMap(const Corrections& given, MapEditor& editor) {
+void ApplyCorrections(const Corrections& given, MapEditor& editor) {
   const Map& map = editor.map();
-  const Corrections corrections = Complete(map, given);
+  const Corrections corrections = WithDescendants(map, given);
   std::vector<std::pair<LandmarkId, Landmark>> moved;
   map.landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
     const std::vector<Observation>& observations = map.ObservationsOf(id);
@@ -64,23 +84,13 @@ void BendMap(const Corrections& given, MapEditor& editor) {
 }
 
 void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEditor& editor) {
-  const Map& map = editor.map();
   Corrections corrections;
   for (const LoopResult::Correction& correction : loop.corrections) {
     corrections.emplace(correction.id, correction.new_world_from_old);
   }
-  BendMap(corrections, editor);
-  const KeyframeId current_root = RootOf(map, loop.answers), matched_root = RootOf(map, loop.matched);
-  if (current_root > matched_root) HangBelow(loop.answers, loop.matched, editor);
-  if (current_root < matched_root) HangBelow(loop.matched, loop.answers, editor);
-
-  const std::vector<KeyframeId> older = KeyframesAround(map, loop.matched, options.num_neighbours);
-  const std::vector<KeyframeId> around_current = KeyframesAround(map, loop.answers, options.num_neighbours);
-  std::set<KeyframeId> newer(around_current.begin(), around_current.end());
-  const std::vector<LandmarkId> older_landmarks = LandmarksSeenBy(map, older);
-  SeeOlderPlace(loop, editor);
-  for (const KeyframeId id : older) newer.erase(id);
-  ProjectLandmarks(newer, older_landmarks, options.search, editor);
+  ApplyCorrections(corrections, editor);
+  JoinTrees(loop, editor);
+  FuseVisits(loop, options, editor);
   editor.AddClosedLoop(
       {loop.answers, loop.matched, loop.matched_from_current.scale, static_cast<int32_t>(loop.seen.size())});
 }
@@ -111,7 +121,7 @@ void ApplyAdjustment(const GlobalAdjustment& adjustment, const AdjustmentBase& b
       adjusted.emplace(point.id, point.position_in_world);
     }
   }
-  BendMap(corrections, editor);
+  ApplyCorrections(corrections, editor);
   for (const auto& [id, position_in_world] : adjusted) {
     Landmark landmark = *map.FindLandmark(id);
     landmark.position_in_world = position_in_world;

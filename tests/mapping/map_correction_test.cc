@@ -1,4 +1,4 @@
-#include "mapping/map_bending.h"
+#include "mapping/map_correction.h"
 
 #include <gtest/gtest.h>
 
@@ -32,14 +32,14 @@ void EditBoth(Map& map, Edit edit) {
   EXPECT_EQ(replica.Sha256Hex(), map.Sha256Hex());
 }
 
-TEST(MapBending, KeyframesMoveByTheirCorrectionOrTheirParents) {
+TEST(MapCorrection, KeyframesMoveByTheirCorrectionOrTheirParents) {
   SyntheticWorld world(SensorType::kMono, 0.0);
   PlantedMap planted(world);
   for (int64_t k = 0; k < 6; ++k) planted.Add(k, {k - 1});
   const Map before = planted.map();
   const Sim3 other{0.7, ExpSO3({0.0, 0.2, 0.0}), {0.0, 0.0, 1.0}};
   EditBoth(planted.map(), [&](MapEditor& editor) {
-    BendMap({{{1}, kAway}, {{3}, other}, {{77}, kAway}}, editor);  // 77 is gone
+    ApplyCorrections({{{1}, kAway}, {{3}, other}, {{77}, kAway}}, editor);  // 77 is gone
   });
   const std::vector<Sim3> moves{{}, kAway, kAway, other, other, other};
   for (int64_t k = 0; k < 6; ++k) {
@@ -91,7 +91,7 @@ class TwoVisits {
   LoopResult loop_;
 };
 
-TEST(MapBending, ClosingALoopMakesTwoPlacesOne) {
+TEST(MapCorrection, ClosingALoopMakesTwoPlacesOne) {
   for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
     SyntheticWorld world(sensor, 0.2);
     const Sim3 away{sensor == SensorType::kMono ? kAway.scale : 1.0, kAway.rotation, kAway.translation};
@@ -117,7 +117,7 @@ TEST(MapBending, ClosingALoopMakesTwoPlacesOne) {
 }
 
 // The older place may belong to the part that moves, far and turned round: its landmarks are found all the same.
-TEST(MapBending, ThePlaceThatMovesIsFusedToo) {
+TEST(MapCorrection, ThePlaceThatMovesIsFusedToo) {
   SyntheticWorld world(SensorType::kMono, 0.2);
   PlantedMap planted(world);
   const Sim3 away{2.5, ExpSO3({0.0, 2.8, 0.0}), {7.0, 1.0, -3.0}};
@@ -139,7 +139,7 @@ TEST(MapBending, ThePlaceThatMovesIsFusedToo) {
 }
 
 // What happened since the loop was found does no harm: landmarks that are gone, a new keyframe, one that was culled.
-TEST(MapBending, AMapThatWentOnIsBentAsAWhole) {
+TEST(MapCorrection, AMapThatGrewSinceIsCorrectedAsAWhole) {
   SyntheticWorld world(SensorType::kStereo, 0.2);
   const Sim3 away{1.0, kAway.rotation, kAway.translation};
   TwoVisits visits(world, away);
@@ -159,7 +159,7 @@ TEST(MapBending, AMapThatWentOnIsBentAsAWhole) {
 }
 
 // The older part may be the one that moves: the newer keyframe's tree is the older one's.
-TEST(MapBending, TheTreeThatBeganLaterHangsBelowTheOther) {
+TEST(MapCorrection, TheTreeThatBeganLaterHangsBelowTheOther) {
   SyntheticWorld world(SensorType::kStereo, 0.2);
   TwoVisits visits(world, Sim3{1.0, kAway.rotation, kAway.translation});
   Map& map = visits.planted().map();
@@ -177,7 +177,7 @@ TEST(MapBending, TheTreeThatBeganLaterHangsBelowTheOther) {
   for (int64_t k = 0; k < 8; ++k) EXPECT_EQ(RootOf(map, {k}), KeyframeId{0}) << k;
 }
 
-TEST(MapBending, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
+TEST(MapCorrection, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
   SyntheticWorld world(SensorType::kStereo, 0.2);
   PlantedMap planted(world);
   for (int64_t k = 0; k < 4; ++k) planted.Add(k, {k - 1});
@@ -225,8 +225,8 @@ TEST(MapBending, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
   EXPECT_EQ(planted.map().FindLandmark(gone), nullptr);
 }
 
-// The map bends by a metre on its way; the pictures know better.
-TEST(GlobalAdjustment, BringsABentMapNearerToTheTruth) {
+// The map is deformed by up to a meter; the observations are right.
+TEST(GlobalAdjustment, BringsADeformedMapNearerToTheTruth) {
   for (const SensorType sensor : {SensorType::kStereo, SensorType::kMono}) {
     SyntheticWorld world(sensor, 0.3);
     PlantedMap planted(world);
@@ -238,7 +238,7 @@ TEST(GlobalAdjustment, BringsABentMapNearerToTheTruth) {
         const double way = static_cast<double>(k) / 20.0;
         corrections[{k}] = Sim3::From({ExpSO3({0.0, 0.05 * way * way, 0.0}), {way * way, 0.0, 0.0}});
       }
-      BendMap(corrections, editor);
+      ApplyCorrections(corrections, editor);
     });
     const double before = planted.WorstKeyframe(map);
     EXPECT_GT(before, 0.5);

@@ -1,0 +1,26 @@
+// Keyframe culling: keyframes whose landmarks others observe just as well leave the map, which so grows with the area
+// explored and not with the time spent there. As in ORB-SLAM (Mur-Artal et al. 2015).
+#pragma once
+
+#include <string>
+
+#include "map/map_editor.h"
+#include "map/removed_keyframes.h"
+
+namespace tessera {
+
+struct KeyframeCullingOptions {
+  double redundant_share = 0.9;  // a keyframe is redundant if more than this share of its landmarks ...
+  int redundant_observers = 3;   // ... has so many other observers, on a pyramid level at most one coarser
+  int kept_newest = 3;           // the newest keyframes stay: their neighbors are yet to come
+
+  // Empty if all is well, else one sentence.
+  std::string Check() const;
+};
+
+// Removes the redundant keyframes among those that share landmarks with `center`. Their children pass to their parents,
+// and `removed` remembers where they were. Roots of the spanning tree stay, and so do keyframes that closed a loop.
+void CullKeyframes(KeyframeId center, const KeyframeCullingOptions& options, RemovedKeyframes& removed,
+                   MapEditor& editor);
+
+}  // namespace tessera
