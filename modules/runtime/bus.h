@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "messages/channels.h"
+#include "messages/topics.h"
 #include "settings/settings.h"
 #include "wire/bytes.h"
 

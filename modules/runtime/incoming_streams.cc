@@ -25,16 +25,16 @@ void IncomingStreams::Close() {
   for (const auto& bus : buses_) bus->Unsubscribe(this);
 }
 
-void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_ptr<Bus> bus, Delivery delivery,
+void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_ptr<Bus> bus,
                           ChannelReceiver::Sink sink) {
   auto subscription = std::make_unique<Subscription>();
   subscription->channel = channel.name;
   subscription->type = &WireType::Named(type);
-  if (delivery == Delivery::kUnordered) {
+  if (channel.delivery == Delivery::kUnordered) {
     subscription->sink = std::move(sink);
   } else {
     StreamReceiverOptions options = settings_.receiver;
-    options.starts_now = delivery == Delivery::kFromNow;
+    options.starts_now = channel.delivery == Delivery::kFromNow;
     options.discards_at_restart = true;  // a frame behind one that lacks would be taken for the next
     subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
   }

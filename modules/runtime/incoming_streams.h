@@ -27,8 +27,7 @@ class IncomingStreams {
 
   // Gives messages of the channel, which must be of type `type` ("pose_t"), to `sink`, in the way that their delivery
   // asks for. Throws std::runtime_error if the network refuses.
-  void Add(const Channel& channel, const char* type, std::shared_ptr<Bus> bus, Delivery delivery,
-           ChannelReceiver::Sink sink);
+  void Add(const Channel& channel, const char* type, std::shared_ptr<Bus> bus, ChannelReceiver::Sink sink);
 
   // Everything on a bus, for recording: streams in order and repaired from their first message on, what has no order as
   // it comes, what is not this project's too. HEARTBEAT and REPAIR are left out: played again, they would speak of

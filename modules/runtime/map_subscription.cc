@@ -15,13 +15,13 @@ constexpr std::chrono::milliseconds kAskAgain{300};
 
 MapSubscription::MapSubscription(StageContext& context, bool joins_late, std::function<void()> on_deltas)
     : context_(context), on_deltas_(std::move(on_deltas)), follower_(joins_late) {
-  requests_ = context.Advertise<MapRequest>(kMapRequestChannel, Publishers::kMany);
-  context.Subscribe<MapDelta>(kMapDeltaChannel, [this](const MapDelta& delta, const MessageInfo&) {
+  requests_ = context.Advertise(kMapRequest);
+  context.Subscribe(kMapDelta, [this](const MapDelta& delta) {
     follower_.Receive(std::make_shared<const MapDelta>(delta));
     on_deltas_();
     Ask();
   });
-  context.Subscribe<MapSnapshotPage>(kMapSnapshotChannel, [this](const MapSnapshotPage& page, const MessageInfo&) {
+  context.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) {
     follower_.Receive(page);
     on_deltas_();
     Ask();

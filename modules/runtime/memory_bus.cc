@@ -52,8 +52,8 @@ class TestBus : public Bus {
 
 struct MemoryBus::Impl {
   struct Member {
-    std::unique_ptr<StageContext> context;
-    std::shared_ptr<void> stage;  // ends before its context
+    std::unique_ptr<StageEngine> engine;
+    std::shared_ptr<void> stage;  // ends before its engine
   };
   // One round of all stages; moves the clock to the next thing that is due if none did anything.
   void Step();
@@ -72,7 +72,7 @@ void MemoryBus::Impl::Step() {
   bool did_something = false;
   int64_t due_us = INT64_MAX;
   for (Member& member : members) {
-    StageContext::Impl& engine = member.context->impl();
+    StageEngine& engine = *member.engine;
     if (engine.stopped_) {
       engine.Silence();
       continue;
@@ -89,14 +89,14 @@ void MemoryBus::Impl::Step() {
 int64_t MemoryBus::Impl::NumValues() const {
   int64_t num_values = 0;
   for (const Member& member : members) {
-    num_values += member.context->impl().num_values();
+    num_values += member.engine->num_values();
   }
   return num_values;
 }
 
 const MemoryBus::Impl::Member* MemoryBus::Impl::Find(const std::string& name) const {
   const auto it = std::find_if(members.begin(), members.end(),
-                               [&](const Member& member) { return member.context->name() == name; });
+                               [&](const Member& member) { return member.engine->context().name() == name; });
   return it == members.end() ? nullptr : &*it;
 }
 
@@ -110,24 +110,23 @@ StageContext& MemoryBus::AddContext(const std::string& name, int id, const std::
   Impl* impl = impl_.get();
   Settings settings = impl->settings;
   for (const std::string& assignment : assignments) settings.Override(assignment);
-  StageContext::Impl::Setup setup{.settings = std::move(settings),
-                                  .identity = {.name = name,
-                                               .id = id,
-                                               .epoch_us = impl->clock->WallUs() + ++impl->num_started,
-                                               .host = "memory",
-                                               .pid = static_cast<int32_t>(impl->num_started)},
-                                  .clock = impl->clock,
-                                  .open_bus = [impl](const std::string&) { return impl->bus; },
-                                  .log = [](bool, const std::string&) {}};
-  impl->members.push_back(
-      {std::make_unique<StageContext>(std::make_unique<StageContext::Impl>(std::move(setup))), nullptr});
-  impl->members.back().context->impl().state_ = StageState::kRunning;
-  return *impl->members.back().context;
+  StageEngine::Setup setup{.settings = std::move(settings),
+                           .identity = {.name = name,
+                                        .id = id,
+                                        .epoch_us = impl->clock->WallUs() + ++impl->num_started,
+                                        .host = "memory",
+                                        .pid = static_cast<int32_t>(impl->num_started)},
+                           .clock = impl->clock,
+                           .open_bus = [impl](const std::string&) { return impl->bus; },
+                           .log = [](bool, const std::string&) {}};
+  impl->members.push_back({std::make_unique<StageEngine>(std::move(setup)), nullptr});
+  impl->members.back().engine->state_ = StageState::kRunning;
+  return impl->members.back().engine->context();
 }
 
 void MemoryBus::Keep(const std::string& name, std::shared_ptr<void> stage) {
   const auto newest = std::find_if(impl_->members.rbegin(), impl_->members.rend(),
-                                   [&](const Impl::Member& member) { return member.context->name() == name; });
+                                   [&](const Impl::Member& member) { return member.engine->context().name() == name; });
   newest->stage = std::move(stage);
 }
 
@@ -136,7 +135,7 @@ void MemoryBus::Kill(const std::string& name) {
   if (dead == nullptr) {
     throw std::invalid_argument("no stage " + name + " to kill");
   }
-  dead->context->impl().Silence();  // what its destructor says is not heard
+  dead->engine->Silence();  // what its destructor says is not heard
   impl_->members[static_cast<size_t>(dead - impl_->members.data())].stage.reset();
   impl_->members.erase(impl_->members.begin() + (dead - impl_->members.data()));
 }
@@ -169,12 +168,12 @@ void MemoryBus::RunUntilQuiet(double quiet_s) {
 
 int MemoryBus::exit_status(const std::string& name) const {
   const Impl::Member* member = impl_->Find(name);
-  return member == nullptr ? 0 : member->context->impl().exit_status_;
+  return member == nullptr ? 0 : member->engine->exit_status_;
 }
 
 std::string MemoryBus::failure(const std::string& name) const {
   const Impl::Member* member = impl_->Find(name);
-  return member == nullptr ? "" : member->context->impl().failure_;
+  return member == nullptr ? "" : member->engine->failure_;
 }
 
 }  // namespace tessera

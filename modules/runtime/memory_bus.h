@@ -4,7 +4,7 @@
 //   MemoryBus bus(Settings::LoadDefaults(path));
 //   auto tracker = bus.Start<TrackerStage>("tracker");
 //   StageContext& probe = bus.AddContext("probe");
-//   probe.Subscribe<PoseEstimate>(kPoseChannel, ...);
+//   probe.Subscribe(kPose, ...);
 //   ASSERT_TRUE(bus.RunUntil([&] { return num_poses == 100; }));
 #pragma once
 

@@ -15,12 +15,11 @@ constexpr size_t kLcmHeaderBytes = 8;
 OutgoingStreams::OutgoingStreams(const StageIdentity& identity, const StreamSettings& settings)
     : identity_(identity), settings_(settings) {}
 
-int OutgoingStreams::Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired, bool is_exclusive) {
+int OutgoingStreams::Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired) {
   streams_.push_back({.channel = channel,
                       .full_name = settings_.channel_prefix + channel.name,
                       .bus = std::move(bus),
                       .is_repaired = is_repaired,
-                      .is_exclusive = is_exclusive,
                       .history = StreamHistory(settings_.history_bytes)});
   return static_cast<int>(streams_.size()) - 1;
 }
@@ -77,7 +76,7 @@ std::vector<Heartbeat> OutgoingStreams::MakeHeartbeats() const {
     heartbeats.back().streams.push_back({.channel = stream.channel.name,
                                          .first_sequence = stream.history.first(),
                                          .next_sequence = stream.history.next(),
-                                         .is_exclusive = stream.is_exclusive});
+                                         .is_exclusive = stream.channel.publishers == Publishers::kOne});
   }
   for (Heartbeat& heartbeat : heartbeats) {
     heartbeat.host = identity_.host;
@@ -87,8 +86,9 @@ std::vector<Heartbeat> OutgoingStreams::MakeHeartbeats() const {
 }
 
 bool OutgoingStreams::IsExclusive(const std::string& channel) const {
-  return std::any_of(streams_.begin(), streams_.end(),
-                     [&](const Stream& stream) { return stream.is_exclusive && stream.channel.name == channel; });
+  return std::any_of(streams_.begin(), streams_.end(), [&](const Stream& stream) {
+    return stream.channel.publishers == Publishers::kOne && stream.channel.name == channel;
+  });
 }
 
 }  // namespace tessera

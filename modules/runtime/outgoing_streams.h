@@ -27,7 +27,7 @@ class OutgoingStreams {
   OutgoingStreams(const StageIdentity& identity, const StreamSettings& settings);
 
   // A new stream; returns its number here. `is_repaired`: its messages are kept and announced.
-  int Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired, bool is_exclusive);
+  int Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired);
 
   // The header of the next value in the stream.
   MessageHeader NextHeader(int stream, int64_t wall_us) const;
@@ -44,7 +44,7 @@ class OutgoingStreams {
 
   // How far the repaired streams have come, in lots that each fit one message.
   std::vector<Heartbeat> MakeHeartbeats() const;
-  const std::string& channel(int stream) const { return streams_[static_cast<size_t>(stream)].channel.name; }
+  const Channel& channel(int stream) const { return streams_[static_cast<size_t>(stream)].channel; }
   // Whether channel `channel` is sent here, and nobody else may send on it.
   bool IsExclusive(const std::string& channel) const;
 
@@ -54,7 +54,6 @@ class OutgoingStreams {
     std::string full_name;  // with prefix
     std::shared_ptr<Bus> bus;
     bool is_repaired = true;
-    bool is_exclusive = false;
     StreamHistory history;
     int64_t num_sent = 0;
   };

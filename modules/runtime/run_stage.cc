@@ -88,8 +88,8 @@ std::string HostName() {
   return name;
 }
 
-StageContext::Impl::Setup MakeSetup(const Arguments& arguments) {
-  StageContext::Impl::Setup setup;
+StageEngine::Setup MakeSetup(const Arguments& arguments) {
+  StageEngine::Setup setup;
   setup.settings = ReadSettings(arguments);
   setup.clock = std::make_shared<ComputerClock>();
   setup.identity = {.name = arguments.name,
@@ -106,7 +106,7 @@ StageContext::Impl::Setup MakeSetup(const Arguments& arguments) {
 }
 
 // Sleeps until a message waits or something is due, and at most a tenth of a second: signals are looked at then.
-void Wait(const StageContext::Impl& engine) {
+void Wait(const StageEngine& engine) {
   std::vector<pollfd> descriptors;
   for (const auto& bus : engine.buses()) {
     if (bus->file_descriptor() >= 0) descriptors.push_back({bus->file_descriptor(), POLLIN, 0});
@@ -116,28 +116,28 @@ void Wait(const StageContext::Impl& engine) {
   ppoll(descriptors.data(), descriptors.size(), &timeout, nullptr);
 }
 
-void RunFor(StageContext::Impl& engine, int64_t duration_us) {
+void RunFor(StageEngine& engine, int64_t duration_us) {
   const int64_t end_us = engine.clock_->NowUs() + duration_us;
   while (engine.clock_->NowUs() < end_us && !engine.stopped_) {
     if (!engine.Step()) Wait(engine);
   }
 }
 
-bool CanListenAnywhere(const StageContext::Impl& engine) {
+bool CanListenAnywhere(const StageEngine& engine) {
   const auto buses = engine.buses();
   return std::any_of(buses.begin(), buses.end(), [](const auto& bus) { return bus->can_listen(); });
 }
 
-void RunUntilStopped(StageContext& context) {
-  StageContext::Impl& engine = context.impl();
+void RunUntilStopped(StageEngine& engine) {
   while (!told_to_stop && !engine.stopped_) {
     if (!engine.Step()) Wait(engine);
-    if (context.finished() && !CanListenAnywhere(engine)) break;  // writing a log: nobody will ask for anything
+    if (engine.context().finished() && !CanListenAnywhere(engine))
+      break;  // writing a log: nobody will ask for anything
   }
 }
 
 // A recorder that is told to stop first gets what is on its way, and asks for what lacks, as long as there is hope.
-void CompleteRecording(StageContext::Impl& engine) {
+void CompleteRecording(StageEngine& engine) {
   constexpr int64_t kLongestUs = 2'000'000;
   RunFor(engine, 2 * engine.stream_settings_.heartbeat_us);  // a tail that got lost is known then
   const int64_t end_us = engine.clock_->NowUs() + kLongestUs;
@@ -151,17 +151,16 @@ void CompleteRecording(StageContext::Impl& engine) {
 int Live(const std::string& program, const Arguments& arguments,
          const std::function<std::shared_ptr<void>(StageContext&)>& make_stage) {
   CheckCpu();
-  StageContext::Impl::Setup setup = MakeSetup(arguments);
+  StageEngine::Setup setup = MakeSetup(arguments);
   CheckReceiveBuffer(setup.settings);
-  StageContext context(std::make_unique<StageContext::Impl>(std::move(setup)));
-  StageContext::Impl& engine = context.impl();
+  StageEngine engine(std::move(setup));
   const int64_t two_heartbeats_us = 2 * engine.stream_settings_.heartbeat_us;
   if (CanListenAnywhere(engine)) RunFor(engine, two_heartbeats_us);  // who else is here?
   std::shared_ptr<void> stage;
   if (!engine.stopped_) {
-    stage = make_stage(context);
+    stage = make_stage(engine.context());
     engine.BeginToRun();  // who waits for it to run need not wait for the next regular one
-    RunUntilStopped(context);
+    RunUntilStopped(engine);
     if (engine.incoming_.hears_all()) CompleteRecording(engine);
   }
   const int64_t num_published = engine.figures_.num_published;

@@ -16,25 +16,21 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
-#include "messages/channels.h"
-#include "messages/stage_messages.h"
+#include "messages/topics.h"
+#include "runtime/value_receiver.h"
 #include "settings/settings.h"
 #include "wire/bytes.h"
+#include "wire/codec.h"
 
 namespace tessera {
 
-struct MessageInfo {
-  std::string publisher;   // stage name
-  int64_t epoch_us = 0;    // start time of the publisher
-  int64_t sequence = 0;    // of the value's last part in its stream
-  int64_t publish_us = 0;  // publisher's wall clock when it sent it; for measuring only
-  int64_t arrival_us = 0;  // wall clock at which the first part arrived here; for measuring only
-};
-
 class StageContext;
+class StageEngine;
 
 // Sends values of one type on one channel. Cheap to copy; valid as long as the context.
 template <class Value>
@@ -47,18 +43,16 @@ class Publisher {
 
  private:
   friend class StageContext;
+  Publisher(StageContext* context, int stream) : context_(context), stream_(stream) {}
+
   StageContext* context_ = nullptr;
   int stream_ = -1;
 };
 
-// Whether a channel may have several publishers at once (STATUS), or a second one is an error (POSE).
-enum class Publishers { kOne, kMany };
-
 class StageContext {
  public:
-  struct Impl;
-  explicit StageContext(std::unique_ptr<Impl> impl);
-  ~StageContext();
+  // Made by the engine that runs the stage.
+  explicit StageContext(StageEngine& engine) : engine_(engine) {}
   StageContext(const StageContext&) = delete;
   StageContext& operator=(const StageContext&) = delete;
 
@@ -71,13 +65,20 @@ class StageContext {
   int64_t now_us() const;
 
   // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
+  // Throws std::runtime_error if the channel may have one publisher only and another process is it.
   template <class Value>
-  Publisher<Value> Advertise(const Channel& channel, Publishers publishers = Publishers::kOne);
+  Publisher<Value> Advertise(const Topic<Value>& topic) {
+    return {this, AddStream(topic)};
+  }
 
-  // `handler` gets every value of every publisher of the channel, per publisher in order and once. What was lost on
-  // the way is asked for again; what does not come is counted in STATUS, and the stream goes on behind it.
-  template <class Value>
-  void Subscribe(const Channel& channel, std::function<void(const Value&, const MessageInfo&)> handler);
+  // `handler` gets every value of every publisher of the channel, per publisher in order and once. It takes the value,
+  // or (value, const MessageInfo&), and returns nothing or a Result<>: a failed one refuses the value, which is then
+  // counted, reported and passed over. Messages that were lost on the way are asked for again; those that do not come
+  // are counted in STATUS, and the stream continues behind them.
+  template <class Value, class Handler>
+  void Subscribe(const Topic<Value>& topic, Handler handler) {
+    AddSubscription(topic, TypeName<Value>(), MakeReceiverOf<Value>(std::move(handler)));
+  }
 
   // For recording: `handler` gets every message of every bus, also of each extractor's, as it was sent (`channel` with
   // prefix); streams from their first message on, in order and repaired. HEARTBEAT and REPAIR are left out: played
@@ -114,11 +115,32 @@ class StageContext {
   void ReportError(const std::string& sentence);
   void Info(const std::string& sentence);
 
-  Impl& impl() { return *impl_; }
-
  private:
-  std::unique_ptr<Impl> impl_;
+  template <class Value>
+  friend class Publisher;
+  // Encodes a value into messages of at most `max_bytes` each.
+  using Encoder = std::function<std::vector<Bytes>(const MessageHeader& first, size_t max_bytes)>;
+
+  int AddStream(const Channel& channel);
+  void Send(int stream, const Encoder& encode, std::optional<int64_t> source_us);
+  void ForgetSent(int stream);
+  void AddSubscription(const Channel& channel, const char* type, MakeReceiver make_receiver);
+
+  StageEngine& engine_;
 };
+
+template <class Value>
+void Publisher<Value>::Publish(const Value& value) const {
+  const auto encode = [&value](const MessageHeader& first, size_t max_bytes) {
+    return EncodeValue(value, first, max_bytes);
+  };
+  context_->Send(stream_, encode, SourceTime(value));
+}
+
+template <class Value>
+void Publisher<Value>::Forget() const {
+  context_->ForgetSent(stream_);
+}
 
 // Measures a step from construction to destruction and records it.
 class StepTimer {

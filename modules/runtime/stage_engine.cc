@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <charconv>
+#include <initializer_list>
 #include <stdexcept>
+#include <utility>
 
+#include "core/errors.h"
+#include "messages/topics.h"
 #include "wire/codec.h"
 
 namespace tessera {
@@ -12,10 +16,11 @@ namespace {
 constexpr int kMaxMessagesPerBus = 64;  // handled in one round, so that timers and other buses get their turn
 constexpr int64_t kStatusPeriodUs = 500'000;
 constexpr int64_t kMaxErrorsPerSecond = 10;  // that are logged; all are counted
+constexpr size_t kMaxPublishers = 4096;      // of one channel
 
 }  // namespace
 
-StageContext::Impl::Impl(Setup setup)
+StageEngine::StageEngine(Setup setup)
     : settings_(std::move(setup.settings)),
       identity_(std::move(setup.identity)),
       stream_settings_(StreamSettings::From(settings_)),
@@ -26,52 +31,110 @@ StageContext::Impl::Impl(Setup setup)
       neighbours_(identity_),
       outgoing_(identity_, stream_settings_),
       incoming_(stream_settings_, *clock_, [this](const std::string& sentence) { ReportError(sentence); }) {
-  talks_ = BusOf(kHeartbeatChannel)->can_listen();
+  talks_ = BusOf(kHeartbeat)->can_listen();
   heartbeat_due_us_ = status_due_us_ = clock_->NowUs();
   if (!talks_) return;
-  heartbeat_stream_ = Advertise(kHeartbeatChannel, Delivery::kUnordered, false);
-  repair_stream_ = Advertise(kRepairChannel, Delivery::kUnordered, false);
-  status_stream_ = Advertise(kStatusChannel, Delivery::kUnordered, false);
-  Subscribe<Heartbeat>(kHeartbeatChannel, [this](const Heartbeat& heartbeat, const MessageHeader& header, int64_t) {
-    OnHeartbeat(heartbeat, header);
-  });
+  heartbeat_stream_ = Advertise(kHeartbeat);
+  repair_stream_ = Advertise(kRepair);
+  status_stream_ = Advertise(kStatus);
+  const auto on_heartbeat = [this](const Heartbeat& heartbeat, const MessageInfo& info) {
+    OnHeartbeat(heartbeat, {.publisher = info.publisher, .epoch_us = info.epoch_us});
+  };
+  Subscribe(kHeartbeat, TypeName<Heartbeat>(), MakeReceiverOf<Heartbeat>(on_heartbeat), Listener::kEngine);
 }
 
-std::shared_ptr<Bus> StageContext::Impl::BusOf(const Channel& channel) { return BusAt(UrlOf(channel, settings_)); }
+std::shared_ptr<Bus> StageEngine::BusOf(const Channel& channel) { return BusAt(UrlOf(channel, settings_)); }
 
-std::shared_ptr<Bus> StageContext::Impl::BusAt(const std::string& url) {
+std::shared_ptr<Bus> StageEngine::BusAt(const std::string& url) {
   std::shared_ptr<Bus>& bus = buses_[url];
   if (!bus) bus = open_bus_(url);
   return bus;
 }
 
-std::vector<std::shared_ptr<Bus>> StageContext::Impl::buses() const {
+std::vector<std::shared_ptr<Bus>> StageEngine::buses() const {
   std::vector<std::shared_ptr<Bus>> buses;
   for (const auto& [url, bus] : buses_) buses.push_back(bus);
   return buses;
 }
 
-int StageContext::Impl::Advertise(const Channel& channel, Delivery delivery, bool is_exclusive) {
-  if (is_exclusive) {
+int StageEngine::Advertise(const Channel& channel) {
+  if (channel.publishers == Publishers::kOne) {
     if (const auto conflict = neighbours_.ConflictOverChannel(channel.name, clock_->NowUs())) {
       throw std::runtime_error(*conflict);
     }
   }
   const std::shared_ptr<Bus> bus = BusOf(channel);
-  const bool is_repaired = delivery != Delivery::kUnordered && talks_ && bus->can_listen();
-  const int stream = outgoing_.Add(channel, bus, is_repaired, is_exclusive);
+  const bool is_repaired = channel.delivery != Delivery::kUnordered && talks_ && bus->can_listen();
+  const int stream = outgoing_.Add(channel, bus, is_repaired);
   if (is_repaired && !hears_repairs_) {
     hears_repairs_ = true;
-    Subscribe<RepairRequest>(kRepairChannel, [this](const RepairRequest& request, const MessageHeader&, int64_t) {
-      outgoing_.Resend(request, clock_->NowUs());
-    });
+    const auto on_request = [this](const RepairRequest& request) { outgoing_.Resend(request, clock_->NowUs()); };
+    Subscribe(kRepair, TypeName<RepairRequest>(), MakeReceiverOf<RepairRequest>(on_request), Listener::kEngine);
   }
-  // Who begins to listen now must know that the stream's first messages are meant for him.
-  if (delivery == Delivery::kFromNow) SendHeartbeats();
+  // A subscriber that begins to listen now must know that the stream's first messages are meant for it.
+  if (channel.delivery == Delivery::kFromNow) SendHeartbeats();
   return stream;
 }
 
-StageContext& StageContext::Impl::Join(const std::string& channel_prefix) {
+void StageEngine::Send(int stream, const Encoder& encode, std::optional<int64_t> source_us) {
+  if (stopped_ && stream != status_stream_) return;
+  const Channel& channel = outgoing_.channel(stream);
+  const MessageHeader header = outgoing_.NextHeader(stream, clock_->WallUs());
+  bool is_sent = false;
+  try {
+    is_sent = outgoing_.Send(stream, encode(header, outgoing_.MaxMessageBytes(stream)), source_us);
+  } catch (const InputError& error) {
+    return Fail(error.what(), 2);  // the log that is written can't be kept
+  }
+  if (!is_sent) ReportError("the operating system refused to send a message on " + channel.name);
+  if (channel.delivery == Delivery::kUnordered) return;
+  ++figures_.num_published;
+  soon_due_us_ = clock_->NowUs() + stream_settings_.receiver.repair_us;
+}
+
+template <class Value>
+void StageEngine::SendValue(int stream, const Value& value) {
+  const auto encode = [&](const MessageHeader& first, size_t max_bytes) {
+    return EncodeValue(value, first, max_bytes);
+  };
+  Send(stream, encode, std::nullopt);
+}
+
+void StageEngine::Subscribe(const Channel& channel, const char* type, MakeReceiver make_receiver, Listener listener) {
+  auto receivers = std::make_shared<std::map<std::string, std::unique_ptr<ValueReceiver>>>();  // by publisher
+  ChannelReceiver::Sink sink;
+  sink.deliver = [this, receivers, name = channel.name, delivery = channel.delivery, listener,
+                  make_receiver = std::move(make_receiver)](ByteView message, const MessageHeader& header,
+                                                            int64_t arrival_us) {
+    if (listener == Listener::kStage && stage_is_gone_) return;
+    if (receivers->size() > kMaxPublishers) receivers->clear();  // made-up names
+    std::unique_ptr<ValueReceiver>& receiver = (*receivers)[header.publisher];
+    if (!receiver) receiver = make_receiver();
+    Receive(name, *receiver, delivery, message, header, arrival_us);
+  };
+  sink.lose = [this, receivers, name = channel.name](const std::string& publisher, int64_t num_messages) {
+    if (const auto it = receivers->find(publisher); it != receivers->end()) it->second->Interrupt();
+    if (num_messages > 0) {
+      ReportError(std::to_string(num_messages) + " messages of " + publisher + " on " + name +
+                  " are lost: they were asked for again and did not come");
+    }
+  };
+  incoming_.Add(channel, type, BusOf(channel), std::move(sink));
+}
+
+void StageEngine::Receive(const std::string& channel, ValueReceiver& receiver, Delivery delivery, ByteView message,
+                          const MessageHeader& header, int64_t arrival_us) {
+  CallSafely("a value on " + channel, [&] {
+    const Result<bool> is_whole = receiver.Receive(message, header, arrival_us);
+    if (!is_whole) {
+      incoming_.Refuse(channel, is_whole.error().sentence);
+    } else if (*is_whole && delivery != Delivery::kUnordered) {
+      ++figures_.num_received;
+    }
+  });
+}
+
+StageContext& StageEngine::Join(const std::string& channel_prefix) {
   Settings settings = settings_;
   settings.Override("bus.channel_prefix=" + channel_prefix);
   Setup setup{.settings = std::move(settings),
@@ -79,23 +142,25 @@ StageContext& StageContext::Impl::Join(const std::string& channel_prefix) {
               .clock = clock_,
               .open_bus = [this](const std::string& url) { return BusAt(url); },
               .log = log_};
-  others_.push_back(std::make_unique<StageContext>(std::make_unique<Impl>(std::move(setup))));
-  others_.back()->impl().state_ = state_;
-  return *others_.back();
+  others_.push_back(std::make_unique<StageEngine>(std::move(setup)));
+  others_.back()->state_ = state_;
+  return others_.back()->context();
 }
 
-void StageContext::Impl::SubscribeAll(const IncomingStreams::RawHandler& handler) {
-  const auto safely = [this, handler](const std::string& channel, ByteView message, int64_t arrival_us) {
+void StageEngine::SubscribeAll(IncomingStreams::RawHandler handler) {
+  const auto safely = [this, handler = std::move(handler)](const std::string& channel, ByteView message,
+                                                           int64_t arrival_us) {
+    if (stage_is_gone_) return;
     CallSafely("a message on " + channel, [&] { handler(channel, message, arrival_us); });
   };
   incoming_.SetRawHandler(safely);
-  for (const Channel& channel : {kHeartbeatChannel, kCameraChannel, kTileFeaturesChannel}) {
+  for (const Channel& channel : std::initializer_list<Channel>{kHeartbeat, kCamera, kTileFeatures}) {
     incoming_.AddAll(BusOf(channel));
   }
 }
 
 // While everything is recorded, each extractor's own bus is listened to once its stream is announced.
-void StageContext::Impl::ListenToExtractors(const Heartbeat& heartbeat) {
+void StageEngine::ListenToExtractors(const Heartbeat& heartbeat) {
   const std::string prefix = "TILE_";
   for (const StreamHead& head : heartbeat.streams) {
     int extractor = -1;
@@ -105,12 +170,12 @@ void StageContext::Impl::ListenToExtractors(const Heartbeat& heartbeat) {
       continue;
     }
     if (extractor >= 0 && extractor < kMaxExtractors) {
-      CallSafely(head.channel, [&] { incoming_.AddAll(BusOf(TileChannel(extractor))); });
+      CallSafely(head.channel, [&] { incoming_.AddAll(BusOf(TileTopic(extractor))); });
     }
   }
 }
 
-void StageContext::Impl::OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header) {
+void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header) {
   const int64_t now_us = clock_->NowUs();
   neighbours_.OnHeartbeat(header, heartbeat, now_us);
   if (incoming_.hears_all()) ListenToExtractors(heartbeat);
@@ -124,28 +189,29 @@ void StageContext::Impl::OnHeartbeat(const Heartbeat& heartbeat, const MessageHe
   if (conflict && !stopped_) Fail(*conflict, 1);
 }
 
-void StageContext::Impl::SendHeartbeats() {
+void StageEngine::SendHeartbeats() {
   const int64_t now_us = clock_->NowUs();
   heartbeat_due_us_ = now_us + stream_settings_.heartbeat_us;
   soon_due_us_ = INT64_MAX;
   if (!talks_) return;
   for (const Heartbeat& heartbeat : outgoing_.MakeHeartbeats()) {
-    Send(heartbeat_stream_, heartbeat);
+    SendValue(heartbeat_stream_, heartbeat);
   }
 }
 
-void StageContext::Impl::SendStatus(bool is_final) {
+void StageEngine::SendStatus(bool is_final) {
   const int64_t now_us = clock_->NowUs();
   status_due_us_ = now_us + kStatusPeriodUs;
   if (!talks_) return;
   const StageState state = exit_status_ != 0 ? StageState::kFailed : state_;
   if (is_final) {
-    for (const auto& other : others_) other->impl().SendStatus(true);
+    for (const auto& other : others_) other->SendStatus(true);
   }
-  Send(status_stream_, figures_.MakeStatus(state, incoming_.counts(), incoming_.num_undecodable(), now_us, is_final));
+  SendValue(status_stream_,
+            figures_.MakeStatus(state, incoming_.counts(), incoming_.num_undecodable(), now_us, is_final));
 }
 
-void StageContext::Impl::ReportError(const std::string& sentence) {
+void StageEngine::ReportError(const std::string& sentence) {
   figures_.last_error = sentence;
   const int64_t now_us = clock_->NowUs();
   if (now_us - errors_since_us_ >= 1'000'000) {
@@ -158,14 +224,14 @@ void StageContext::Impl::ReportError(const std::string& sentence) {
   if (++num_errors_ <= kMaxErrorsPerSecond) log_(true, sentence);
 }
 
-void StageContext::Impl::Fail(const std::string& sentence, int exit_status) {
+void StageEngine::Fail(const std::string& sentence, int exit_status) {
   if (stopped_) return;
   figures_.last_error = failure_ = sentence;
   exit_status_ = exit_status;
   stopped_ = true;
 }
 
-void StageContext::Impl::CallSafely(const std::string& where, const std::function<void()>& call) {
+void StageEngine::CallSafely(const std::string& where, const std::function<void()>& call) {
   try {
     call();
   } catch (const std::exception& error) {
@@ -173,7 +239,7 @@ void StageContext::Impl::CallSafely(const std::string& where, const std::functio
   }
 }
 
-bool StageContext::Impl::HandleMessages() {
+bool StageEngine::HandleMessages() {
   bool some_wait = false;
   for (const auto& bus : buses()) {  // a copy: a handler may open another
     int num_handled = 0;
@@ -183,7 +249,7 @@ bool StageContext::Impl::HandleMessages() {
   return some_wait;
 }
 
-void StageContext::Impl::RunTimers() {
+void StageEngine::RunTimers() {
   for (size_t i = 0; i < timers_.size() && !stopped_; ++i) {  // by index: a task may add a timer
     const int64_t now_us = clock_->NowUs();
     if (timers_[i].due_us > now_us) continue;
@@ -196,7 +262,7 @@ void StageContext::Impl::RunTimers() {
   if (now_us >= status_due_us_) SendStatus(false);
 }
 
-bool StageContext::Impl::RunIdleTasks() {
+bool StageEngine::RunIdleTasks() {
   bool again = false;
   for (size_t i = 0; i < idle_tasks_.size() && !stopped_; ++i) {  // by index: a task may add one
     const auto task = idle_tasks_[i];
@@ -205,71 +271,71 @@ bool StageContext::Impl::RunIdleTasks() {
   return again;
 }
 
-void StageContext::Impl::AskForRepairs() {
+void StageEngine::AskForRepairs() {
   for (const RepairRequest& request : incoming_.Poll()) {
-    Send(repair_stream_, request);
+    SendValue(repair_stream_, request);
   }
 }
 
 // One robot's namesake of this process is no reason to fail the others.
-void StageContext::Impl::PartFromFailed() {
+void StageEngine::PartFromFailed() {
   for (const auto& other : others_) {
-    Impl& engine = other->impl();
+    StageEngine& engine = *other;
     if (!engine.stopped_ || engine.is_silent_) continue;
     engine.Silence();
     ReportError("under the channel prefix `" + engine.stream_settings_.channel_prefix + "`: " + engine.failure_);
   }
 }
 
-bool StageContext::Impl::Step() {
+bool StageEngine::Step() {
   const bool some_wait = HandleMessages();  // of all prefixes: the buses are the same
   RunTimers();
   for (const auto& other : others_) {
-    if (!other->impl().is_silent_) other->impl().RunTimers();
+    if (!other->is_silent_) other->RunTimers();
   }
   PartFromFailed();
   if (some_wait || stopped_) return !stopped_;
   AskForRepairs();
   for (const auto& other : others_) {
-    if (!other->impl().is_silent_) other->impl().AskForRepairs();
+    if (!other->is_silent_) other->AskForRepairs();
   }
   bool again = RunIdleTasks();
-  for (const auto& other : others_) again |= !other->impl().is_silent_ && other->impl().RunIdleTasks();
+  for (const auto& other : others_) again |= !other->is_silent_ && other->RunIdleTasks();
   return again;
 }
 
-int64_t StageContext::Impl::NextDueUs() const {
+int64_t StageEngine::NextDueUs() const {
   int64_t due_us = std::min({heartbeat_due_us_, soon_due_us_, status_due_us_});
   for (const Timer& timer : timers_) due_us = std::min(due_us, timer.due_us);
   for (const auto& other : others_) {
-    if (!other->impl().is_silent_) due_us = std::min(due_us, other->impl().NextDueUs());
+    if (!other->is_silent_) due_us = std::min(due_us, other->NextDueUs());
   }
   return std::min(due_us, incoming_.next_poll_us().value_or(INT64_MAX));
 }
 
-void StageContext::Impl::BeginToRun() {
+void StageEngine::BeginToRun() {
   state_ = StageState::kRunning;
   SendStatus(false);
-  for (const auto& other : others_) other->impl().BeginToRun();
+  for (const auto& other : others_) other->BeginToRun();
 }
 
-int64_t StageContext::Impl::num_values() const {
+int64_t StageEngine::num_values() const {
   int64_t num_values = figures_.num_received + figures_.num_published;
-  for (const auto& other : others_) num_values += other->impl().num_values();
+  for (const auto& other : others_) num_values += other->num_values();
   return num_values;
 }
 
-void StageContext::Impl::Silence() {
+void StageEngine::Silence() {
   stopped_ = is_silent_ = true;
   incoming_.Close();
-  for (const auto& other : others_) other->impl().Silence();
+  for (const auto& other : others_) other->Silence();
 }
 
-void StageContext::Impl::ForgetStage() {
+void StageEngine::ForgetStage() {
   stage_is_gone_ = true;
   timers_.clear();
   idle_tasks_.clear();
-  for (const auto& other : others_) other->impl().ForgetStage();
+  for (const auto& other : others_) other->ForgetStage();
 }
 
 }  // namespace tessera

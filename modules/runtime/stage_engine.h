@@ -22,7 +22,8 @@
 
 namespace tessera {
 
-struct StageContext::Impl {
+class StageEngine {
+ public:
   struct Setup {
     Settings settings;
     StageIdentity identity;
@@ -31,18 +32,23 @@ struct StageContext::Impl {
     std::function<void(bool is_error, const std::string& sentence)> log;
   };
   // Opens the main bus and listens there for who else is on it. Throws as OpenBus does.
-  explicit Impl(Setup setup);
+  explicit StageEngine(Setup setup);
+  StageEngine(const StageEngine&) = delete;
+  StageEngine& operator=(const StageEngine&) = delete;
+
+  // What the stage sees of this.
+  StageContext& context() { return context_; }
 
   // --- for StageContext ---
   std::shared_ptr<Bus> BusOf(const Channel& channel);
-  // Throws std::runtime_error if the channel already has another publisher.
-  int Advertise(const Channel& channel, Delivery delivery, bool is_exclusive);
-  template <class Value>
-  void Send(int stream, const Value& value);
-  template <class Value>
-  void Subscribe(const Channel& channel,
-                 std::function<void(const Value&, const MessageHeader&, int64_t arrival_us)> handler);
-  void SubscribeAll(const IncomingStreams::RawHandler& handler);
+  // Returns the number of the new stream. Throws std::runtime_error if the channel already has its only publisher.
+  int Advertise(const Channel& channel);
+  using Encoder = std::function<std::vector<Bytes>(const MessageHeader& first, size_t max_bytes)>;
+  void Send(int stream, const Encoder& encode, std::optional<int64_t> source_us);
+  // A listening stage hears nothing any more when it is gone; the engine's own subscriptions continue.
+  enum class Listener { kEngine, kStage };
+  void Subscribe(const Channel& channel, const char* type, MakeReceiver make_receiver, Listener listener);
+  void SubscribeAll(IncomingStreams::RawHandler handler);
   StageContext& Join(const std::string& channel_prefix);
   void ReportError(const std::string& sentence);
   void Fail(const std::string& sentence, int exit_status);
@@ -95,6 +101,10 @@ struct StageContext::Impl {
   std::shared_ptr<Bus> BusAt(const std::string& url);
   void OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header);
   void ListenToExtractors(const Heartbeat& heartbeat);
+  void Receive(const std::string& channel, ValueReceiver& receiver, Delivery delivery, ByteView message,
+               const MessageHeader& header, int64_t arrival_us);
+  template <class Value>
+  void SendValue(int stream, const Value& value);
   bool HandleMessages();
   void RunTimers();
   void AskForRepairs();
@@ -112,7 +122,8 @@ struct StageContext::Impl {
   int64_t num_errors_ = 0;  // reported within the second that began at
   int64_t errors_since_us_ = 0;
   bool is_silent_ = false;
-  std::vector<std::unique_ptr<StageContext>> others_;  // this process under other prefixes; driven by this one
+  StageContext context_{*this};
+  std::vector<std::unique_ptr<StageEngine>> others_;  // this process under other prefixes; driven by this one
 };
 
 }  // namespace tessera

@@ -1,4 +1,10 @@
 // CAMERA, CALIBRATION, GROUND_TRUTH, END_OF_STREAM.
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+
+#include "geometry/camera_frame.h"
+#include "messages/end_of_stream.h"
 #include "tessera/calibration_t.hpp"
 #include "tessera/camera_image_t.hpp"
 #include "tessera/end_of_stream_t.hpp"
@@ -11,12 +17,17 @@ namespace {
 
 constexpr int kMaxImageSize = 16384;  // px, as in CameraCalibration::Check
 
+// end_of_stream_t::stage, in the order of StageKind.
+constexpr std::string_view kStageNames[] = {"camera", "dispatcher", "reassembler", "tracker", "mapper"};
+
 }  // namespace
 
 template <>
 struct Codec<CameraFrame> {
   using Message = camera_image_t;
   static constexpr const char* kTypeName = "camera_image_t";
+
+  static int64_t SourceTime(const CameraFrame& frame) { return frame.utime_us; }
 
   template <class Emit>
   static void Cut(const CameraFrame& frame, Message* message, size_t max_bytes, Emit emit) {
@@ -41,7 +52,7 @@ struct Codec<CameraFrame> {
     }
     if (std::string problem = AddBand(message, frame); !problem.empty()) return problem;
     const bool is_last = message.header.part + 1 == message.header.num_parts;
-    return Require(!is_last || Misses(*frame, message.width, message.height) < 0, "not all of its pixels came");
+    return SentenceUnless(!is_last || Misses(*frame, message.width, message.height) < 0, "not all of its pixels came");
   }
 
  private:
@@ -50,12 +61,13 @@ struct Codec<CameraFrame> {
     frame->id.value = message.frame;
     frame->utime_us = message.utime;
     frame->sensor = static_cast<SensorType>(message.sensor);
-    return FirstProblem({CheckFrame(message.frame), CheckTimes(message.utime, 0),
-                         Require(message.sensor >= camera_model_t::MONO && message.sensor <= camera_model_t::RGBD,
-                                 "its sensor is none of mono, stereo, rgbd"),
-                         Require(message.width >= 1 && message.width <= kMaxImageSize && message.height >= 1 &&
-                                     message.height <= kMaxImageSize,
-                                 "its image size is not between 1 and 16384 px")});
+    return FirstProblem(
+        {CheckFrame(message.frame), CheckTimes(message.utime, 0),
+         SentenceUnless(message.sensor >= camera_model_t::MONO && message.sensor <= camera_model_t::RGBD,
+                        "its sensor is none of mono, stereo, rgbd"),
+         SentenceUnless(message.width >= 1 && message.width <= kMaxImageSize && message.height >= 1 &&
+                            message.height <= kMaxImageSize,
+                        "its image size is not between 1 and 16384 px")});
   }
   // The image that the next pixels belong to; -1 if the frame is complete.
   static int Misses(const CameraFrame& frame, int width, int height) {
@@ -129,21 +141,23 @@ struct Codec<EndOfStream> {
 
   template <class Emit>
   static void Cut(const EndOfStream& end, Message* message, size_t, Emit emit) {
-    message->stage = Printable(end.stage);
+    message->stage = kStageNames[static_cast<size_t>(end.stage)];
     message->num_frames = end.num_frames;
     message->num_dropped = end.num_dropped;
     message->num_values = end.num_values;
     emit(*message);
   }
   static std::string Join(const Message& message, EndOfStream* end) {
-    *end = {.stage = message.stage,
+    const auto* const name = std::find(std::begin(kStageNames), std::end(kStageNames), message.stage);
+    if (name == std::end(kStageNames)) return "its stage is none of those that end their streams";
+    *end = {.stage = static_cast<StageKind>(name - std::begin(kStageNames)),
             .num_frames = message.num_frames,
             .num_dropped = message.num_dropped,
             .num_values = message.num_values};
     return FirstProblem(
-        {CheckFrame(message.num_frames), Require(!end->stage.empty() && end->num_dropped >= 0 &&
-                                                     end->num_dropped <= end->num_frames && end->num_values >= 0,
-                                                 "its stage is empty or its counts are out of range")});
+        {CheckFrame(message.num_frames),
+         SentenceUnless(end->num_dropped >= 0 && end->num_dropped <= end->num_frames && end->num_values >= 0,
+                        "its counts are out of range")});
   }
 };
 TESSERA_CODEC(EndOfStream);

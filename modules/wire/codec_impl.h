@@ -12,6 +12,7 @@
 // and then says TESSERA_CODEC(Value).
 #pragma once
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -89,11 +90,6 @@ template <class Value>
 ValueJoiner<Value>::~ValueJoiner() = default;
 
 template <class Value>
-const Value& ValueJoiner<Value>::value() const {
-  return state_->value;
-}
-
-template <class Value>
 bool ValueJoiner<Value>::Interrupt() {
   const bool had_begun = state_->next_part > 0;
   state_->next_part = 0;
@@ -101,31 +97,36 @@ bool ValueJoiner<Value>::Interrupt() {
 }
 
 template <class Value>
-typename ValueJoiner<Value>::Result ValueJoiner<Value>::Add(ByteView message, const MessageHeader& header) {
+Result<const Value*> ValueJoiner<Value>::Add(ByteView message, const MessageHeader& header) {
   State& state = *state_;
-  const bool continues = header.part == state.next_part && (header.part == 0 || header.num_parts == state.num_parts);
-  if (!continues && header.part > 0) {
-    state.next_part = 0;
-    return Result::kIncomplete;
-  }
+  const int32_t expected_part = std::exchange(state.next_part, 0);
+  const bool continues = header.part == expected_part && (header.part == 0 || header.num_parts == state.num_parts);
+  if (!continues && header.part > 0) return nullptr;
   static const WireType& type = WireType::Named(Codec<Value>::kTypeName);
   if (WireType::Of(message) != &type || !DecodeMessage(message, &state.message)) {
-    problem_ = "it is not a " + type.name();
-  } else {
-    problem_ = Codec<Value>::Join(state.message, &state.value);
+    return Failed("it is not a " + type.name());
   }
-  if (!problem_.empty()) {
-    state.next_part = 0;
-    return Result::kRefused;
+  if (const std::string problem = Codec<Value>::Join(state.message, &state.value); !problem.empty()) {
+    return Failed(problem);
   }
-  const bool is_last = header.part + 1 == header.num_parts;
-  state.next_part = is_last ? 0 : header.part + 1;
+  if (header.part + 1 == header.num_parts) return &state.value;
+  state.next_part = header.part + 1;
   state.num_parts = header.num_parts;
-  return is_last ? Result::kComplete : Result::kIncomplete;
+  return nullptr;
+}
+
+template <class Value>
+std::optional<int64_t> SourceTime(const Value& value) {
+  if constexpr (requires { Codec<Value>::SourceTime(value); }) {
+    return Codec<Value>::SourceTime(value);
+  } else {
+    return std::nullopt;
+  }
 }
 
 #define TESSERA_CODEC(Value)                                                                  \
   template const char* TypeName<Value>();                                                     \
+  template std::optional<int64_t> SourceTime<Value>(const Value&);                            \
   template std::vector<Bytes> EncodeValue<Value>(const Value&, const MessageHeader&, size_t); \
   template class ValueJoiner<Value>
 

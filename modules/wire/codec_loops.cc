@@ -48,7 +48,7 @@ std::string JoinSeen(const std::vector<seen_landmark_t>& messages, int32_t num, 
     if (messages[i].keypoint < 0 || messages[i].landmark < 0) return "a seen landmark is out of range";
     seen->push_back({messages[i].keypoint, {messages[i].landmark}});
   }
-  return Require(seen->size() <= kMaxItems, "it sees more landmarks than any frame would");
+  return SentenceUnless(seen->size() <= kMaxItems, "it sees more landmarks than any frame would");
 }
 
 }  // namespace
@@ -98,20 +98,23 @@ struct Codec<LoopResult> {
       result->num_matched = message.num_matched;
       result->num_aligned = message.num_aligned;
     }
-    std::string problem = FirstProblem(
-        {Require(message.keyframe >= 0 && message.keyframe == result->answers.value, "its keyframe is out of range"),
-         Require(message.matched >= -1 && message.matched < message.keyframe, "its matched keyframe is out of range"),
-         FromMessage(message.matched_from_current, &result->matched_from_current),
-         Require(message.num_candidates >= 0 && message.num_consistent >= 0 && message.num_matched >= 0 &&
-                     message.num_aligned >= 0,
-                 "one of its counts is negative"),
-         JoinSeen(message.seen, message.num_seen, &result->seen)});
+    std::string problem =
+        FirstProblem({SentenceUnless(message.keyframe >= 0 && message.keyframe == result->answers.value,
+                                     "its keyframe is out of range"),
+                      SentenceUnless(message.matched >= -1 && message.matched < message.keyframe,
+                                     "its matched keyframe is out of range"),
+                      FromMessage(message.matched_from_current, &result->matched_from_current),
+                      SentenceUnless(message.num_candidates >= 0 && message.num_consistent >= 0 &&
+                                         message.num_matched >= 0 && message.num_aligned >= 0,
+                                     "one of its counts is negative"),
+                      JoinSeen(message.seen, message.num_seen, &result->seen)});
     for (size_t i = 0; problem.empty() && i < static_cast<size_t>(message.num_corrections); ++i) {
       LoopResult::Correction& correction = result->corrections.emplace_back();
       correction.id.value = message.corrections[i].keyframe;
-      problem = FirstProblem({Require(correction.id.valid(), "a corrected keyframe is out of range"),
-                              FromMessage(message.corrections[i].new_world_from_old, &correction.new_world_from_old),
-                              Require(result->corrections.size() <= kMaxItems, "it corrects more than any map holds")});
+      problem = FirstProblem(
+          {SentenceUnless(correction.id.valid(), "a corrected keyframe is out of range"),
+           FromMessage(message.corrections[i].new_world_from_old, &correction.new_world_from_old),
+           SentenceUnless(result->corrections.size() <= kMaxItems, "it corrects more than any map holds")});
     }
     return problem;
   }
@@ -166,7 +169,7 @@ struct Codec<GlobalAdjustment> {
       GlobalAdjustment::Pose& pose = adjustment->poses.emplace_back();
       pose.id.value = message.poses[i].keyframe;
       const std::string problem =
-          FirstProblem({Require(pose.id.valid(), "a pose's keyframe is out of range"),
+          FirstProblem({SentenceUnless(pose.id.valid(), "a pose's keyframe is out of range"),
                         FromMessage(message.poses[i].world_from_camera, &pose.world_from_camera)});
       if (!problem.empty()) return problem;
     }
@@ -177,8 +180,8 @@ struct Codec<GlobalAdjustment> {
         return "a landmark is out of range";
       }
     }
-    return Require(adjustment->poses.size() <= kMaxItems && adjustment->points.size() <= kMaxItems,
-                   "it moves more than any map holds");
+    return SentenceUnless(adjustment->poses.size() <= kMaxItems && adjustment->points.size() <= kMaxItems,
+                          "it moves more than any map holds");
   }
 };
 TESSERA_CODEC(GlobalAdjustment);
@@ -207,10 +210,10 @@ struct Codec<RelocalizationRequest> {
   static std::string Join(const Message& message, RelocalizationRequest* request) {
     const bool begins = message.header.part == 0, is_last = message.header.part + 1 == message.header.num_parts;
     if (begins) request->last_keyframe.value = message.last_keyframe;
-    return FirstProblem(
-        {Require(message.last_keyframe >= -1, "its keyframe is out of range"),
-         JoinKeypoints(message.keypoints, begins, &request->features),
-         Require(!is_last || HasAllKeypoints(message.keypoints, request->features), "its parts do not fit together")});
+    return FirstProblem({SentenceUnless(message.last_keyframe >= -1, "its keyframe is out of range"),
+                         JoinKeypoints(message.keypoints, begins, &request->features),
+                         SentenceUnless(!is_last || HasAllKeypoints(message.keypoints, request->features),
+                                        "its parts do not fit together")});
   }
 };
 TESSERA_CODEC(RelocalizationRequest);
@@ -245,8 +248,9 @@ struct Codec<RelocalizationAnswer> {
       answer->num_candidates = message.num_candidates;
     }
     return FirstProblem(
-        {CheckFrame(message.frame), Require(message.frame == answer->frame.value, "its parts do not fit together"),
-         Require(message.reference >= -1 && message.num_candidates >= 0, "its reference is out of range"),
+        {CheckFrame(message.frame),
+         SentenceUnless(message.frame == answer->frame.value, "its parts do not fit together"),
+         SentenceUnless(message.reference >= -1 && message.num_candidates >= 0, "its reference is out of range"),
          FromMessage(message.reference_from_camera, &answer->reference_from_camera),
          JoinSeen(message.seen, message.num_seen, &answer->seen)});
   }

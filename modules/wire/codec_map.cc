@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "map/map_exchange.h"
+#include "map/removed_keyframes.h"
 #include "tessera/map_delta_t.hpp"
 #include "tessera/map_file_t.hpp"
 #include "tessera/map_request_t.hpp"
@@ -10,6 +11,7 @@
 #include "wire/codec_impl.h"
 #include "wire/codec_map_change.h"
 #include "wire/codec_parts.h"
+#include "wire/map_file.h"
 
 namespace tessera {
 namespace {
@@ -83,8 +85,9 @@ struct Codec<MapSnapshotPage> {
     const bool is_plain = change.num_moved_keyframes == 0 && change.num_removed_observations == 0 &&
                           change.num_changed_parents == 0 && change.num_removed_landmarks == 0 &&
                           change.num_removed_keyframes == 0;
-    return FirstProblem({Require(message.page >= 0 && message.page < message.num_pages, "its page is out of range"),
-                         Require(is_plain, "a snapshot takes nothing back"), problem});
+    return FirstProblem(
+        {SentenceUnless(message.page >= 0 && message.page < message.num_pages, "its page is out of range"),
+         SentenceUnless(is_plain, "a snapshot takes nothing back"), problem});
   }
 };
 TESSERA_CODEC(MapSnapshotPage);
@@ -105,9 +108,10 @@ struct Codec<MapFileHeader> {
   }
   static std::string Join(const Message& message, MapFileHeader* header) {
     *header = {message.version, message.num_pages, message.num_keyframes, message.num_landmarks, {}};
-    return FirstProblem({Require(message.num_pages >= 1 && message.num_keyframes >= 0 && message.num_landmarks >= 0,
-                                 "one of its counts is out of range"),
-                         FromMessage(message.camera, &header->camera)});
+    return FirstProblem(
+        {SentenceUnless(message.num_pages >= 1 && message.num_keyframes >= 0 && message.num_landmarks >= 0,
+                        "one of its counts is out of range"),
+         FromMessage(message.camera, &header->camera)});
   }
 };
 TESSERA_CODEC(MapFileHeader);
@@ -126,8 +130,8 @@ struct Codec<MapRequest> {
   }
   static std::string Join(const Message& message, MapRequest* request) {
     *request = {.next_delta = message.next_delta, .snapshot = message.snapshot, .page = message.page};
-    return Require(message.next_delta >= -1 && message.snapshot >= -1 && message.page >= 0,
-                   "one of its numbers is out of range");
+    return SentenceUnless(message.next_delta >= -1 && message.snapshot >= -1 && message.page >= 0,
+                          "one of its numbers is out of range");
   }
 };
 TESSERA_CODEC(MapRequest);
@@ -159,12 +163,13 @@ struct Codec<RemovedInDelta> {
   }
   static std::string Join(const Message& message, RemovedInDelta* removed) {
     if (message.header.part == 0) *removed = {message.delta, {}};
-    std::string problem = Require(message.delta >= 0 && message.delta == removed->delta, "its delta is out of range");
+    std::string problem =
+        SentenceUnless(message.delta >= 0 && message.delta == removed->delta, "its delta is out of range");
     for (size_t i = 0; problem.empty() && i < static_cast<size_t>(message.num_ties); ++i) {
       KeyframeTie& tie = removed->ties.emplace_back();
       tie.keyframe.value = message.ties[i].keyframe;
       tie.parent.value = message.ties[i].parent;
-      problem = FirstProblem({Require(tie.parent.valid() && tie.keyframe.valid(), "a keyframe is out of range"),
+      problem = FirstProblem({SentenceUnless(tie.parent.valid() && tie.keyframe.valid(), "a keyframe is out of range"),
                               FromMessage(message.ties[i].parent_from_keyframe, &tie.parent_from_keyframe)});
     }
     return problem;

@@ -42,7 +42,7 @@ class ChangeJoiner {
                           &delta_.removed_observations),
          JoinObservations(First(change_.new_observations, change_.num_new_observations), &delta_.new_observations),
          JoinParents(), JoinRemoved(), JoinLoops(),
-         Require(NumItems() <= kMaxItems, "it changes more than any mapper would")});
+         SentenceUnless(NumItems() <= kMaxItems, "it changes more than any mapper would")});
   }
 
  private:
@@ -61,10 +61,10 @@ class ChangeJoiner {
       MapDelta::NewKeyframe& added = delta_.new_keyframes.back();
       // Made above, and shared with nobody yet.
       const auto features = std::const_pointer_cast<FeatureFrame>(added.features);
-      const std::string problem =
-          FirstProblem({Require(message.keyframe >= 0 && message.parent >= -1, "a keyframe's number is out of range"),
-                        FromMessage(message.world_from_camera, &added.world_from_camera), CheckScale(message.scale),
-                        JoinKeypoints(message.keypoints, begins, features.get())});
+      const std::string problem = FirstProblem(
+          {SentenceUnless(message.keyframe >= 0 && message.parent >= -1, "a keyframe's number is out of range"),
+           FromMessage(message.world_from_camera, &added.world_from_camera), CheckScale(message.scale),
+           JoinKeypoints(message.keypoints, begins, features.get())});
       if (!problem.empty()) return problem;
       const bool may_go_on = !is_last && &message == &messages.back();
       if (!may_go_on && !IsWhole(added, message.keypoints.num_total)) return "a keyframe lacks keypoints";

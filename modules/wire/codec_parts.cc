@@ -56,15 +56,15 @@ std::string FirstProblem(std::initializer_list<std::string> problems) {
   return "";
 }
 
-std::string Require(bool holds, const char* sentence) { return holds ? "" : sentence; }
+std::string SentenceUnless(bool holds, const char* sentence) { return holds ? "" : sentence; }
 
 std::string CheckFrame(int64_t frame) {
-  return Require(frame >= 0 && frame < kMaxFrame, "its frame number is out of range");
+  return SentenceUnless(frame >= 0 && frame < kMaxFrame, "its frame number is out of range");
 }
 
 std::string CheckTimes(int64_t utime_us, int64_t arrival_us) {
   const auto in_range = [](int64_t time_us) { return time_us > -kMaxTimeUs && time_us < kMaxTimeUs; };
-  return Require(in_range(utime_us) && in_range(arrival_us), "its time is out of range");
+  return SentenceUnless(in_range(utime_us) && in_range(arrival_us), "its time is out of range");
 }
 
 camera_model_t ToMessage(const CameraCalibration& calibration) {
@@ -100,7 +100,9 @@ std::string FromMessage(const camera_model_t& message, CameraCalibration* calibr
   return calibration->Check();
 }
 
-std::string CheckScale(double scale) { return Require(scale > 1e-9 && scale < 1e9, "its scale is out of range"); }
+std::string CheckScale(double scale) {
+  return SentenceUnless(scale > 1e-9 && scale < 1e9, "its scale is out of range");
+}
 
 sim3_t ToMessage(const Sim3& transform) {
   const rigid3_t pose = ToMessage(transform.Pose());
@@ -184,7 +186,7 @@ std::string FromMessage(const rect_t& message, int width, int height, bool may_b
   }
   const bool is_inside = rect->x >= 0 && rect->y >= 0 && rect->width >= 1 && rect->height >= 1 &&
                          rect->width <= width - rect->x && rect->height <= height - rect->y;
-  return Require(is_inside, "a rectangle leaves the image");
+  return SentenceUnless(is_inside, "a rectangle leaves the image");
 }
 
 descriptor_t ToMessage(const Descriptor& descriptor) {

@@ -25,7 +25,7 @@ namespace tessera {
 // The first sentence that is not empty.
 std::string FirstProblem(std::initializer_list<std::string> problems);
 // `sentence` unless `holds`.
-std::string Require(bool holds, const char* sentence);
+std::string SentenceUnless(bool holds, const char* sentence);
 
 std::string CheckFrame(int64_t frame);
 std::string CheckTimes(int64_t utime_us, int64_t arrival_us);

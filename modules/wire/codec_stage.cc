@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "messages/stage_messages.h"
 #include "tessera/stage_status_t.hpp"
 #include "wire/codec_impl.h"
 #include "wire/codec_parts.h"
@@ -75,11 +76,12 @@ struct Codec<StageStatus> {
       is_finite = is_finite && std::isfinite(message.values[i]);
       status->values.emplace_back(message.value_names[i], message.values[i]);
     }
-    return FirstProblem({Require(!message.name.empty(), "its name is empty"),
-                         Require(message.state >= stage_status_t::STARTING && message.state <= stage_status_t::FAILED,
-                                 "its state is none"),
-                         CheckTimes(message.stage_epoch_us, 0), CheckCounts(message),
-                         Require(is_finite && IsFinite(status->step), "one of its figures is not finite")});
+    return FirstProblem(
+        {SentenceUnless(!message.name.empty(), "its name is empty"),
+         SentenceUnless(message.state >= stage_status_t::STARTING && message.state <= stage_status_t::FAILED,
+                        "its state is none"),
+         CheckTimes(message.stage_epoch_us, 0), CheckCounts(message),
+         SentenceUnless(is_finite && IsFinite(status->step), "one of its figures is not finite")});
   }
 
  private:
@@ -107,7 +109,7 @@ struct Codec<StageStatus> {
     const int64_t lowest =
         std::min({static_cast<int64_t>(message.pid), message.num_received, message.num_published, message.num_dropped,
                   message.num_repaired, message.num_lost, message.num_undecodable, message.queue, message.step_count});
-    return Require(lowest >= 0, "one of its counts is negative");
+    return SentenceUnless(lowest >= 0, "one of its counts is negative");
   }
 };
 TESSERA_CODEC(StageStatus);

@@ -1,4 +1,5 @@
 // HEARTBEAT, REPAIR.
+#include "messages/stream_messages.h"
 #include "tessera/heartbeat_t.hpp"
 #include "tessera/repair_request_t.hpp"
 #include "wire/codec_impl.h"
@@ -43,7 +44,7 @@ struct Codec<Heartbeat> {
                                     .next_sequence = stream.next_sequence,
                                     .is_exclusive = stream.is_exclusive != 0});
     }
-    return Require(message.pid >= 0, "its process id is negative");
+    return SentenceUnless(message.pid >= 0, "its process id is negative");
   }
 };
 TESSERA_CODEC(Heartbeat);

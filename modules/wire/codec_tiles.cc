@@ -3,7 +3,9 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "messages/channels.h"
+#include "features/feature_types.h"
+#include "messages/stage_messages.h"
+#include "messages/topics.h"
 #include "tessera/extractor_ready_t.hpp"
 #include "tessera/tile_ack_t.hpp"
 #include "tessera/tile_features_t.hpp"
@@ -42,11 +44,11 @@ std::string GetTile(const Message& message, Value* value) {
   value->num_tiles = message.num_tiles;
   return FirstProblem(
       {CheckFrame(message.frame), CheckTimes(message.utime, message.arrival), CheckTimes(message.run, 0),
-       Require(message.previous_frame >= -1 && message.previous_frame < message.frame,
-               "the frame before it does not have a lower number"),
-       Require(message.num_tiles >= 1 && message.num_tiles <= kMaxTiles && message.tile >= 0 &&
-                   message.tile < message.num_tiles,
-               "its tile number is out of range"),
+       SentenceUnless(message.previous_frame >= -1 && message.previous_frame < message.frame,
+                      "the frame before it does not have a lower number"),
+       SentenceUnless(message.num_tiles >= 1 && message.num_tiles <= kMaxTiles && message.tile >= 0 &&
+                          message.tile < message.num_tiles,
+                      "its tile number is out of range"),
        FromMessage(message.camera, &value->calibration), FromMessage(message.options, &value->options)});
 }
 
@@ -87,7 +89,7 @@ struct Codec<TileJob> {
     }
     if (std::string problem = AddBand(message.band, job); !problem.empty()) return problem;
     const bool is_last = message.header.part + 1 == message.header.num_parts;
-    return Require(!is_last || Misses(*job) < 0, "not all of its pixels came");
+    return SentenceUnless(!is_last || Misses(*job) < 0, "not all of its pixels came");
   }
 
  private:
@@ -98,9 +100,9 @@ struct Codec<TileJob> {
     job->last_level = message.last_level;
     const int width = job->calibration.width_px;
     const int height = job->calibration.height_px;
-    return FirstProblem({Require(job->first_level >= 0 && job->first_level <= job->last_level &&
-                                     job->last_level < job->options.num_levels,
-                                 "its range of pyramid levels is out of range"),
+    return FirstProblem({SentenceUnless(job->first_level >= 0 && job->first_level <= job->last_level &&
+                                            job->last_level < job->options.num_levels,
+                                        "its range of pyramid levels is out of range"),
                          FromMessage(message.core, width, height, false, &job->core),
                          FromMessage(message.left_rect, width, height, false, &job->left_rect),
                          FromMessage(message.right_rect, width, height, true, &job->right_rect),
@@ -239,7 +241,7 @@ struct Codec<TileAck> {
     ack->tiles.assign(message.tiles.begin(), message.tiles.begin() + message.num_tiles);
     const bool in_range =
         std::all_of(ack->tiles.begin(), ack->tiles.end(), [](int32_t tile) { return tile >= 0 && tile < kMaxTiles; });
-    return FirstProblem({CheckFrame(message.frame), Require(in_range, "a tile number is out of range")});
+    return FirstProblem({CheckFrame(message.frame), SentenceUnless(in_range, "a tile number is out of range")});
   }
 };
 TESSERA_CODEC(TileAck);
@@ -264,9 +266,9 @@ struct Codec<ExtractorReady> {
               .num_robots = message.num_robots};
     return FirstProblem(
         {CheckTimes(ready->epoch_us, 0),
-         Require(ready->extractor >= 0 && ready->extractor < kMaxExtractors && ready->num_jobs_done >= 0 &&
-                     ready->num_robots >= 1 && ready->num_robots <= kMaxRobots,
-                 "its extractor's id or a count is out of range")});
+         SentenceUnless(ready->extractor >= 0 && ready->extractor < kMaxExtractors && ready->num_jobs_done >= 0 &&
+                            ready->num_robots >= 1 && ready->num_robots <= kMaxRobots,
+                        "its extractor's id or a count is out of range")});
   }
 };
 TESSERA_CODEC(ExtractorReady);

@@ -1,6 +1,7 @@
 // FEATURES, POSE, KEYFRAME.
 #include <algorithm>
 
+#include "messages/tracking_types.h"
 #include "tessera/features_t.hpp"
 #include "tessera/keyframe_t.hpp"
 #include "tessera/pose_t.hpp"
@@ -36,7 +37,7 @@ struct Codec<FeatureFrame> {
   static std::string Join(const Message& message, FeatureFrame* frame) {
     const bool is_last = message.header.part + 1 == message.header.num_parts;
     const std::string problem = JoinKeypoints(message.keypoints, message.header.part == 0, frame);
-    return FirstProblem({problem, Require(!is_last || HasAllKeypoints(message.keypoints, *frame), kIncomplete)});
+    return FirstProblem({problem, SentenceUnless(!is_last || HasAllKeypoints(message.keypoints, *frame), kIncomplete)});
   }
 };
 TESSERA_CODEC(FeatureFrame);
@@ -86,14 +87,15 @@ struct Codec<KeyframeObservation> {
       keyframe->num_deltas = message.num_deltas;
     }
     const std::string problem = FirstProblem(
-        {Require(message.keyframe >= 0 && message.keyframe == keyframe->id.value, "its number is out of range"),
-         Require(message.reference >= -1 && message.reference < message.keyframe && message.num_deltas >= 0,
-                 "its reference or its count of deltas is out of range"),
+        {SentenceUnless(message.keyframe >= 0 && message.keyframe == keyframe->id.value, "its number is out of range"),
+         SentenceUnless(message.reference >= -1 && message.reference < message.keyframe && message.num_deltas >= 0,
+                        "its reference or its count of deltas is out of range"),
          FromMessage(message.world_from_camera, &keyframe->world_from_camera),
          FromMessage(message.reference_from_camera, &keyframe->reference_from_camera),
-         Require(message.num_landmarks == message.keypoints.num_keypoints, "it has not one landmark for each keypoint"),
+         SentenceUnless(message.num_landmarks == message.keypoints.num_keypoints,
+                        "it has not one landmark for each keypoint"),
          JoinKeypoints(message.keypoints, begins, &keyframe->features),
-         Require(!is_last || HasAllKeypoints(message.keypoints, keyframe->features), kIncomplete)});
+         SentenceUnless(!is_last || HasAllKeypoints(message.keypoints, keyframe->features), kIncomplete)});
     if (!problem.empty()) return problem;
     for (size_t i = 0; i < static_cast<size_t>(message.num_landmarks); ++i) {
       if (message.landmarks[i] < -1) return "a landmark's number is out of range";
@@ -179,14 +181,14 @@ struct Codec<PoseEstimate> {
              .map_wait_us = message.map_wait_us};
     return FirstProblem(
         {CheckFrame(message.frame), CheckTimes(message.utime, message.arrival),
-         Require(message.state >= pose_t::INITIALIZING && message.state <= pose_t::LOST, "its state is none"),
+         SentenceUnless(message.state >= pose_t::INITIALIZING && message.state <= pose_t::LOST, "its state is none"),
          FromMessage(message.world_from_camera, &pose->world_from_camera),
          FromMessage(message.reference_from_camera, &pose->reference_from_camera),
-         Require(message.reference_keyframe >= -1 && message.num_features >= 0 && message.num_matches >= 0 &&
-                     message.num_inliers >= 0 && message.num_landmarks >= 0 && message.num_deltas >= 0 &&
-                     message.relocalized_by >= -1 && message.relocalized_by <= message.frame &&
-                     message.map_wait_us >= 0,
-                 "one of its counts is negative")});
+         SentenceUnless(message.reference_keyframe >= -1 && message.num_features >= 0 && message.num_matches >= 0 &&
+                            message.num_inliers >= 0 && message.num_landmarks >= 0 && message.num_deltas >= 0 &&
+                            message.relocalized_by >= -1 && message.relocalized_by <= message.frame &&
+                            message.map_wait_us >= 0,
+                        "one of its counts is negative")});
   }
 };
 TESSERA_CODEC(PoseEstimate);

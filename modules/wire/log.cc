@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "messages/channels.h"
+#include "messages/topics.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
 
@@ -33,9 +33,7 @@ struct RecordedStream {
 
 using StreamName = std::pair<std::string, int64_t>;  // publisher and its start
 
-std::array<const Channel*, 4> CameraChannels() {
-  return {&kCalibrationChannel, &kGroundTruthChannel, &kCameraChannel, &kEndOfStreamChannel};
-}
+std::array<const Channel*, 4> CameraChannels() { return {&kCalibration, &kGroundTruth, &kCamera, &kEndOfStream}; }
 
 }  // namespace
 
@@ -110,15 +108,11 @@ RecordedStream LogReader::Impl::Order(const std::string& channel, std::vector<Pl
 template <class Value>
 std::optional<LoggedValue> LogReader::Impl::Join(ValueJoiner<Value>& joiner, const LogEvent& event,
                                                  const MessageHeader& header) {
-  switch (joiner.Add(event.data, header)) {
-    case ValueJoiner<Value>::Result::kIncomplete:
-      return std::nullopt;
-    case ValueJoiner<Value>::Result::kComplete:
-      return joiner.value();
-    case ValueJoiner<Value>::Result::kRefused:
-      break;
+  const Result<const Value*> value = joiner.Add(event.data, header);
+  if (!value) {
+    throw InputError("log " + path + " holds a damaged message on " + event.channel + ": " + value.error().sentence);
   }
-  throw InputError("log " + path + " holds a damaged message on " + event.channel + ": " + joiner.problem());
+  return *value == nullptr ? std::nullopt : std::optional<LoggedValue>(**value);
 }
 
 // The value that the next message of the channel completes, if it does.

@@ -4,7 +4,7 @@
 
 #include "core/errors.h"
 #include "map/map_exchange.h"
-#include "messages/channels.h"
+#include "messages/topics.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
 
@@ -56,12 +56,13 @@ MapFileHeader ReadFileHeader(LogFileReader& file, const std::string& path) {
     Refuse(path, "is no map: it does not begin like one");
   ValueJoiner<MapFileHeader> joiner;
   const auto header = ReadHeader(event.data);
-  if (header && joiner.Add(event.data, *header) == ValueJoiner<MapFileHeader>::Result::kComplete) {
-    if (joiner.value().version == kVersion) return joiner.value();
-  } else if (header) {
-    Refuse(path, "is damaged, or holds no keyframes: " + joiner.problem());
+  if (!header) Refuse(path, "was written by another version of Tessera: make the map again with this one");
+  const Result<const MapFileHeader*> value = joiner.Add(event.data, *header);
+  if (!value) Refuse(path, "is damaged, or holds no keyframes: " + value.error().sentence);
+  if (*value == nullptr || (*value)->version != kVersion) {
+    Refuse(path, "was written by another version of Tessera: make the map again with this one");
   }
-  Refuse(path, "was written by another version of Tessera: make the map again with this one");
+  return **value;
 }
 
 // Every page names the snapshot that it belongs to.
@@ -87,7 +88,7 @@ void WriteMapFile(const Map& map, const std::string& path) {
   int64_t sequence = 1;
   for (int32_t page = 0; page < num_pages; ++page) {
     for (const Bytes& message : EncodeValue(CutSnapshotPage(snapshot, page), HeaderOf(sequence), kMaxMessageBytes)) {
-      file.Write(sequence++, kMapSnapshotChannel.name, message);
+      file.Write(sequence++, kMapSnapshot.name, message);
     }
   }
   file.Close();
@@ -101,12 +102,11 @@ MapDelta ReadMapFile(const std::string& path) {
   int32_t num_pages = 0;
   for (LogEvent event; NextEvent(file, path, &event);) {
     const auto message_header = ReadHeader(event.data);
-    using Result = ValueJoiner<MapSnapshotPage>::Result;
-    const Result result = message_header ? joiner.Add(event.data, *message_header) : Result::kRefused;
     if (!message_header) Refuse(path, "is damaged: one of its messages can't be read");
-    if (result == Result::kRefused) Refuse(path, "is damaged: " + joiner.problem());
-    if (result == Result::kIncomplete) continue;
-    const MapSnapshotPage& page = joiner.value();
+    const Result<const MapSnapshotPage*> value = joiner.Add(event.data, *message_header);
+    if (!value) Refuse(path, "is damaged: " + value.error().sentence);
+    if (*value == nullptr) continue;
+    const MapSnapshotPage& page = **value;
     if (page.page != num_pages || page.num_pages != header.num_pages) Refuse(path, "is damaged: its pages do not fit");
     if (num_pages++ == 0) {
       snapshot = page.part;

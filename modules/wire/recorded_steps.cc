@@ -3,7 +3,7 @@
 #include <set>
 
 #include "core/errors.h"
-#include "messages/channels.h"
+#include "messages/topics.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
 
@@ -14,22 +14,23 @@ RecordedSteps ReadRecordedSteps(const std::string& path, const std::string& chan
   LogFileReader file(path);
   ValueJoiner<PoseEstimate> poses;
   ValueJoiner<RelocalizationAnswer> answers;
-  const auto is_complete = [&](auto& joiner, const LogEvent& event) {
-    using Result = typename std::remove_reference_t<decltype(joiner)>::Result;
+  // The value that the event completes; null if it doesn't.
+  const auto join = [&](auto& joiner, const LogEvent& event) {
     const auto header = ReadHeader(event.data);
-    const Result result = header ? joiner.Add(event.data, *header) : Result::kRefused;
-    if (result != Result::kRefused) return result == Result::kComplete;
-    throw InputError("log " + path + " holds a damaged message on " + event.channel + ": record it again");
+    const auto value = header ? joiner.Add(event.data, *header) : Failed("it has no header");
+    if (!value) throw InputError("log " + path + " holds a damaged message on " + event.channel + ": record it again");
+    return *value;
   };
   for (LogEvent event; file.Next(&event);) {
-    if (event.channel == channel_prefix + kRelocalizationChannel.name && is_complete(answers, event)) {
-      recorded.relocalizations[answers.value().frame] = answers.value();
+    if (event.channel == channel_prefix + kRelocalization.name) {
+      if (const RelocalizationAnswer* answer = join(answers, event)) recorded.relocalizations[answer->frame] = *answer;
+    } else if (event.channel == channel_prefix + kPose.name) {
+      const PoseEstimate* pose = join(poses, event);
+      if (pose == nullptr) continue;
+      recorded.steps[pose->frame] = pose->num_deltas;
+      if (pose->relocalized_by.valid()) recorded.relocalized_by[pose->frame] = pose->relocalized_by;
+      recorded.is_live |= pose->is_live;
     }
-    if (event.channel != channel_prefix + kPoseChannel.name || !is_complete(poses, event)) continue;
-    const PoseEstimate& pose = poses.value();
-    recorded.steps[pose.frame] = pose.num_deltas;
-    if (pose.relocalized_by.valid()) recorded.relocalized_by[pose.frame] = pose.relocalized_by;
-    recorded.is_live |= pose.is_live;
   }
   std::set<FrameId> used;
   for (const auto& [frame, asked] : recorded.relocalized_by) used.insert(asked);

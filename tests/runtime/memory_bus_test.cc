@@ -27,12 +27,13 @@ struct SendAndReceive {
       MemoryBus bus(Defaults());
       std::vector<Value> received;
       MessageInfo info;
-      bus.AddContext("listener").Subscribe<Value>(kPoseChannel, [&](const Value& value, const MessageInfo& value_info) {
+      const Topic<Value> topic{"POSE"};
+      bus.AddContext("listener").Subscribe(topic, [&](const Value& value, const MessageInfo& value_info) {
         received.push_back(value);
         info = value_info;
       });
       StageContext& sender = bus.AddContext("sender");
-      const auto publisher = sender.Advertise<Value>(kPoseChannel);
+      const auto publisher = sender.Advertise(topic);
       std::mt19937 generator(9);
       std::vector<Value> sent;
       for (int i = 0; i < 5; ++i) {
@@ -56,16 +57,14 @@ class Pair {
   explicit Pair(MemoryBus& bus) : bus_(bus) {}
 
   void StartListener() {
-    bus_.AddContext("listener")
-        .Subscribe<CameraFrame>(kCameraChannel, [this](const CameraFrame& frame, const MessageInfo&) {
-          received.push_back(frame.id.value);
-        });
-    bus_.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel,
-                                                      [this](const StageStatus& new_status, const MessageInfo&) {
-                                                        if (new_status.name == "listener") status = new_status;
-                                                      });
+    bus_.AddContext("listener").Subscribe(kCamera, [this](const CameraFrame& frame) {
+      received.push_back(frame.id.value);
+    });
+    bus_.AddContext("watcher").Subscribe(kStatus, [this](const StageStatus& new_status) {
+      if (new_status.name == "listener") status = new_status;
+    });
   }
-  void StartCamera() { frames_ = bus_.AddContext("camera").Advertise<CameraFrame>(kCameraChannel); }
+  void StartCamera() { frames_ = bus_.AddContext("camera").Advertise(kCamera); }
   void Send(int num_frames) {
     for (int i = 0; i < num_frames; ++i) {
       CameraFrame frame{.id = {num_sent_++}, .left = GrayImage(500, 400)};
@@ -151,8 +150,8 @@ TEST(MemoryBus, ARestartedPublisherIsHeard) {
 
 TEST(MemoryBus, ASecondPublisherEndsWithASentence) {
   MemoryBus bus(Defaults());
-  bus.AddContext("tracker").Advertise<PoseEstimate>(kPoseChannel);
-  bus.AddContext("other_tracker").Advertise<PoseEstimate>(kPoseChannel);
+  bus.AddContext("tracker").Advertise(kPose);
+  bus.AddContext("other_tracker").Advertise(kPose);
   ASSERT_TRUE(bus.RunUntil([&] { return bus.exit_status("other_tracker") != 0; }));
   EXPECT_EQ(bus.exit_status("other_tracker"), 1);
   EXPECT_NE(bus.failure("other_tracker").find("POSE already has a publisher: tracker"), std::string::npos);
@@ -162,7 +161,7 @@ TEST(MemoryBus, ASecondPublisherEndsWithASentence) {
       {
         StageContext& third = bus.AddContext("third_tracker");
         bus.RunUntilQuiet();
-        third.Advertise<PoseEstimate>(kPoseChannel);
+        third.Advertise(kPose);
       },
       std::runtime_error);
 }
@@ -173,17 +172,16 @@ TEST(MemoryBus, ASecondProcessOfTheSameNameEnds) {
   StageContext& second = bus.AddContext("extractor_0", 0);
   int num_sent_after_failing = 0;
   bus.RunUntilQuiet();
-  bus.AddContext("watcher").Subscribe<ExtractorReady>(
-      kExtractorReadyChannel, [&](const ExtractorReady&, const MessageInfo&) { ++num_sent_after_failing; });
-  second.Advertise<ExtractorReady>(kExtractorReadyChannel, Publishers::kMany).Publish({.extractor = 0});
+  bus.AddContext("watcher").Subscribe(kExtractorReady, [&](const ExtractorReady&) { ++num_sent_after_failing; });
+  second.Advertise(kExtractorReady).Publish({.extractor = 0});
   bus.RunUntilQuiet();
   EXPECT_EQ(num_sent_after_failing, 0);
 }
 
 TEST(MemoryBus, SeveralPublishersMayShareAChannelThatAllowsIt) {
   MemoryBus bus(Defaults());
-  bus.AddContext("extractor_0").Advertise<TileFeatures>(kTileFeaturesChannel, Publishers::kMany);
-  bus.AddContext("extractor_1").Advertise<TileFeatures>(kTileFeaturesChannel, Publishers::kMany);
+  bus.AddContext("extractor_0").Advertise(kTileFeatures);
+  bus.AddContext("extractor_1").Advertise(kTileFeatures);
   bus.RunUntilQuiet();
   EXPECT_EQ(bus.exit_status("extractor_0") + bus.exit_status("extractor_1"), 0);
 }
@@ -193,22 +191,21 @@ TEST(JoinRobot, EachPrefixHasStreamsOfItsOwn) {
   std::mt19937 generator(3);
   bus.LoseMessages([&](const std::string&) { return generator() % 4 == 0; });
   StageContext& process = bus.AddContext("dispatcher");
-  const auto own = process.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  const auto of_a = process.JoinRobot("a_").Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+  const auto own = process.Advertise(kEndOfStream);
+  const auto of_a = process.JoinRobot("a_").Advertise(kEndOfStream);
   std::map<std::string, std::vector<int64_t>> heard;
   std::set<std::string> statuses;
   for (const std::string prefix : {"", "a_", "b_"}) {
     StageContext& listener = bus.AddContext(prefix + "listener", 0, {"bus.channel_prefix=" + prefix});
-    listener.Subscribe<EndOfStream>(kEndOfStreamChannel, [&heard, prefix](const EndOfStream& end, const MessageInfo&) {
-      heard[prefix].push_back(end.num_frames);
-    });
-    listener.Subscribe<StageStatus>(kStatusChannel, [&statuses, prefix](const StageStatus& status, const MessageInfo&) {
+    listener.Subscribe(kEndOfStream,
+                       [&heard, prefix](const EndOfStream& end) { heard[prefix].push_back(end.num_frames); });
+    listener.Subscribe(kStatus, [&statuses, prefix](const StageStatus& status) {
       if (status.name == "dispatcher") statuses.insert(prefix);
     });
   }
   for (int64_t i = 0; i < 20; ++i) {
-    own.Publish({.stage = "dispatcher", .num_frames = i});
-    of_a.Publish({.stage = "dispatcher", .num_frames = 100 + i});
+    own.Publish({.stage = StageKind::kDispatcher, .num_frames = i});
+    of_a.Publish({.stage = StageKind::kDispatcher, .num_frames = 100 + i});
   }
   ASSERT_TRUE(bus.RunUntil([&] { return heard[""].size() >= 20 && heard["a_"].size() >= 20 && statuses.size() >= 2; }));
   bus.RunUntilQuiet();
@@ -228,8 +225,7 @@ TEST(JoinRobot, ANamesakeUnderOnePrefixSilencesOnlyThat) {
   StageContext& under_a = pool.JoinRobot("a_");
   StageContext& under_b = pool.JoinRobot("b_");
   std::string last_error;
-  bus.AddContext("watcher").Subscribe<StageStatus>(
-      kStatusChannel, [&](const StageStatus& status, const MessageInfo&) { last_error = status.last_error; });
+  bus.AddContext("watcher").Subscribe(kStatus, [&](const StageStatus& status) { last_error = status.last_error; });
   ASSERT_TRUE(bus.RunUntil([&] { return !last_error.empty(); }));
   EXPECT_NE(last_error.find("`a_`"), std::string::npos) << last_error;
   EXPECT_NE(last_error.find("another process has this name already"), std::string::npos) << last_error;
@@ -242,28 +238,28 @@ TEST(MemoryBus, AHandlerThatThrowsIsReportedAndTheStageGoesOn) {
   MemoryBus bus(Defaults());
   StageContext& stage = bus.AddContext("stage");
   int num_handled = 0;
-  stage.Subscribe<EndOfStream>(kEndOfStreamChannel, [&](const EndOfStream&, const MessageInfo&) {
+  stage.Subscribe(kEndOfStream, [&](const EndOfStream&) {
     if (++num_handled == 1) throw std::runtime_error("no idea what to do");
   });
   std::string last_error;
-  bus.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel, [&](const StageStatus& status, const MessageInfo&) {
+  bus.AddContext("watcher").Subscribe(kStatus, [&](const StageStatus& status) {
     if (status.name == "stage") last_error = status.last_error;
   });
-  const auto publisher = bus.AddContext("camera").Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  publisher.Publish({.stage = "camera"});
-  publisher.Publish({.stage = "camera"});
+  const auto publisher = bus.AddContext("camera").Advertise(kEndOfStream);
+  publisher.Publish({.stage = StageKind::kCamera});
+  publisher.Publish({.stage = StageKind::kCamera});
   ASSERT_TRUE(bus.RunUntil([&] { return num_handled == 2 && !last_error.empty(); }));
   EXPECT_NE(last_error.find("no idea what to do"), std::string::npos);
 }
 
 TEST(MemoryBus, MessagesOfAnotherTypeAreCounted) {
   MemoryBus bus(Defaults());
-  bus.AddContext("stage").Subscribe<EndOfStream>(kPoseChannel, [](const EndOfStream&, const MessageInfo&) { FAIL(); });
+  bus.AddContext("stage").Subscribe(Topic<EndOfStream>{"POSE"}, [](const EndOfStream&) { FAIL(); });
   int64_t num_undecodable = 0;
-  bus.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel, [&](const StageStatus& status, const MessageInfo&) {
+  bus.AddContext("watcher").Subscribe(kStatus, [&](const StageStatus& status) {
     if (status.name == "stage") num_undecodable = status.num_undecodable;
   });
-  bus.AddContext("tracker").Advertise<PoseEstimate>(kPoseChannel).Publish({.frame = {0}});
+  bus.AddContext("tracker").Advertise(kPose).Publish({.frame = {0}});
   ASSERT_TRUE(bus.RunUntil([&] { return num_undecodable == 1; }));
 }
 
@@ -289,10 +285,9 @@ TEST(MemoryBus, StatusTellsOfTheStage) {
   MemoryBus bus(Defaults());
   StageContext& stage = bus.AddContext("stage");
   StageStatus status;
-  bus.AddContext("watcher").Subscribe<StageStatus>(kStatusChannel,
-                                                   [&](const StageStatus& new_status, const MessageInfo&) {
-                                                     if (new_status.name == "stage") status = new_status;
-                                                   });
+  bus.AddContext("watcher").Subscribe(kStatus, [&](const StageStatus& new_status) {
+    if (new_status.name == "stage") status = new_status;
+  });
   for (int i = 1; i <= 100; ++i) stage.RecordStep(i);
   stage.SetQueue(4);
   stage.AddDropped(2);

@@ -55,8 +55,8 @@ TEST_F(RecorderTest, HasEveryMessageOnceInOrder) {
   std::mt19937 generator(4);
   bus.LoseMessages([&](const std::string&) { return generator() % 6 == 0; });
   bus.Start<RecorderStage>("recorder");
-  const auto frames = bus.AddContext("camera").Advertise<CameraFrame>(kCameraChannel);
-  const auto jobs = bus.AddContext("dispatcher").Advertise<TileJob>(TileChannel(3));
+  const auto frames = bus.AddContext("camera").Advertise(kCamera);
+  const auto jobs = bus.AddContext("dispatcher").Advertise(TileTopic(3));
   for (int i = 0; i < 20; ++i) {
     frames.Publish(DrawValue<CameraFrame>(generator, 1));
     jobs.Publish(DrawValue<TileJob>(generator, 1));
@@ -77,7 +77,7 @@ TEST_F(RecorderTest, HasEveryMessageOnceInOrder) {
 
 TEST_F(RecorderTest, HasWhatWasSentBeforeItCame) {
   MemoryBus bus(MakeSettings(""));
-  const auto poses = bus.AddContext("tracker").Advertise<PoseEstimate>(kPoseChannel);
+  const auto poses = bus.AddContext("tracker").Advertise(kPose);
   for (int i = 0; i < 10; ++i) poses.Publish({.frame = {i}});
   bus.RunUntilQuiet();
   bus.Start<RecorderStage>("recorder");

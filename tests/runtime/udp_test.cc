@@ -15,8 +15,8 @@ namespace {
 
 std::string Url(int port) { return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0"; }
 
-std::unique_ptr<StageContext> MakeContext(const std::string& name) {
-  StageContext::Impl::Setup setup;
+std::unique_ptr<StageEngine> MakeEngine(const std::string& name) {
+  StageEngine::Setup setup;
   setup.settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   setup.settings.Override("bus.main_url=" + Url(17667));
   setup.settings.Override("bus.camera_url=" + Url(17668));
@@ -24,16 +24,15 @@ std::unique_ptr<StageContext> MakeContext(const std::string& name) {
   setup.identity = {.name = name, .epoch_us = setup.clock->WallUs(), .host = "here", .pid = getpid()};
   setup.open_bus = [](const std::string& url) { return OpenBus(url, 1 << 20); };
   setup.log = [](bool, const std::string&) {};
-  return std::make_unique<StageContext>(std::make_unique<StageContext::Impl>(std::move(setup)));
+  return std::make_unique<StageEngine>(std::move(setup));
 }
 
 TEST(Udp, FramesArriveWholeAndInOrder) {
-  const auto listener = MakeContext("listener");
-  const auto camera = MakeContext("camera");
+  const auto listener = MakeEngine("listener");
+  const auto camera = MakeEngine("camera");
   std::vector<CameraFrame> received;
-  listener->Subscribe<CameraFrame>(kCameraChannel,
-                                   [&](const CameraFrame& frame, const MessageInfo&) { received.push_back(frame); });
-  const auto frames = camera->Advertise<CameraFrame>(kCameraChannel);
+  listener->context().Subscribe(kCamera, [&](const CameraFrame& frame) { received.push_back(frame); });
+  const auto frames = camera->context().Advertise(kCamera);
   std::mt19937 generator(1);
   std::vector<CameraFrame> sent;
   for (int i = 0; i < 30; ++i) {
@@ -42,8 +41,8 @@ TEST(Udp, FramesArriveWholeAndInOrder) {
   }
   // Until all is there: however long this machine takes, what is lost on the way is asked for again.
   while (received.size() < sent.size()) {
-    camera->impl().Step();
-    listener->impl().Step();
+    camera->Step();
+    listener->Step();
   }
   EXPECT_EQ(received, sent);
 }
@@ -77,9 +76,9 @@ TEST(Udp, APortThatIsTakenGivesASentence) {
 
 TEST(Udp, EachExtractorHasABusOfItsOwn) {
   const Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
-  EXPECT_NE(UrlOf(TileChannel(0), settings), UrlOf(TileChannel(1), settings));
-  EXPECT_NE(UrlOf(TileChannel(3), settings).find(":7683?"), std::string::npos);
-  EXPECT_THROW(UrlOf(TileChannel(-1), settings), InputError);
+  EXPECT_NE(UrlOf(TileTopic(0), settings), UrlOf(TileTopic(1), settings));
+  EXPECT_NE(UrlOf(TileTopic(3), settings).find(":7683?"), std::string::npos);
+  EXPECT_THROW(UrlOf(TileTopic(-1), settings), InputError);
 }
 
 }  // namespace

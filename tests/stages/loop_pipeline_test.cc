@@ -56,20 +56,19 @@ class LoopRun {
  public:
   explicit LoopRun(const std::string& tiles = "1x1", int num_extractors = 1, const Overrides& overrides = {})
       : bus_(SettingsOf(folder_, tiles, overrides)), camera_(bus_.AddContext("camera")) {
-    frames_ = camera_.Advertise<CameraFrame>(kCameraChannel);
-    calibration_ = camera_.Advertise<CameraCalibration>(kCalibrationChannel);
-    end_ = camera_.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-    camera_.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+    frames_ = camera_.Advertise(kCamera);
+    calibration_ = camera_.Advertise(kCalibration);
+    end_ = camera_.Advertise(kEndOfStream);
+    camera_.Subscribe(kPose, [this](const PoseEstimate& pose) {
       poses_.push_back(pose);
       SendMore();
     });
-    camera_.Subscribe<LoopResult>(kLoopResultChannel, [this](const LoopResult& result, const MessageInfo&) {
+    camera_.Subscribe(kLoopResult, [this](const LoopResult& result) {
       if (result.matched.valid()) loops_.push_back(result);
     });
-    camera_.Subscribe<GlobalAdjustment>(kGlobalAdjustmentChannel,
-                                        [this](const GlobalAdjustment& adjustment, const MessageInfo&) {
-                                          num_usable_adjustments_ += adjustment.is_usable ? 1 : 0;
-                                        });
+    camera_.Subscribe(kGlobalAdjustment, [this](const GlobalAdjustment& adjustment) {
+      num_usable_adjustments_ += adjustment.is_usable ? 1 : 0;
+    });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<LoopCloserStage>("loop_closer");
     bus_.Start<GlobalAdjusterStage>("global_adjuster");
@@ -109,7 +108,7 @@ class LoopRun {
     for (; next_ < end; ++next_) frames_.Publish(scene_.Frame(next_, StepOf(next_)));
     if (next_ == kNumFrames && !has_ended_) {
       has_ended_ = true;
-      end_.Publish({.stage = "camera", .num_frames = kNumFrames});
+      end_.Publish({.stage = StageKind::kCamera, .num_frames = kNumFrames});
     }
   }
 

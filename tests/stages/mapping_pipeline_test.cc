@@ -23,6 +23,13 @@
 namespace tessera {
 namespace {
 
+// The channel, for a second publisher.
+template <class Value>
+Topic<Value> Shared(Topic<Value> topic) {
+  topic.publishers = Publishers::kMany;
+  return topic;
+}
+
 namespace fs = std::filesystem;
 
 constexpr int64_t kNumFrames = 50;
@@ -45,15 +52,14 @@ class StackRun {
  public:
   explicit StackRun(const std::string& tiles = "1x1", int num_extractors = 1)
       : bus_(SettingsOf(folder_, tiles)), camera_(bus_.AddContext("camera")) {
-    frames_ = camera_.Advertise<CameraFrame>(kCameraChannel);
-    calibration_ = camera_.Advertise<CameraCalibration>(kCalibrationChannel);
-    end_ = camera_.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-    camera_.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+    frames_ = camera_.Advertise(kCamera);
+    calibration_ = camera_.Advertise(kCalibration);
+    end_ = camera_.Advertise(kEndOfStream);
+    camera_.Subscribe(kPose, [this](const PoseEstimate& pose) {
       poses_.push_back(pose);
       SendMore();
     });
-    camera_.Subscribe<StageStatus>(
-        kStatusChannel, [this](const StageStatus& status, const MessageInfo&) { statuses_[status.name] = status; });
+    camera_.Subscribe(kStatus, [this](const StageStatus& status) { statuses_[status.name] = status; });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<MapperStage>("mapper");
     bus_.Start<TrackerStage>("tracker");
@@ -85,7 +91,7 @@ class StackRun {
     for (; next_ < end; ++next_) frames_.Publish(scene_.Frame(next_));
     if (next_ == kNumFrames && !has_ended_) {
       has_ended_ = true;
-      end_.Publish({.stage = "camera", .num_frames = kNumFrames});
+      end_.Publish({.stage = StageKind::kCamera, .num_frames = kNumFrames});
     }
   }
 
@@ -228,8 +234,8 @@ TEST(MappingPipeline, WhoComesLateReachesTheMappersMap) {
 TEST(MappingPipeline, AWrongDeltaIsReportedAndASnapshotMendsIt) {
   StackRun run;
   StageContext& liar = run.bus().AddContext("liar");
-  const auto deltas = liar.Advertise<MapDelta>(kMapDeltaChannel, Publishers::kMany);
-  liar.Subscribe<MapDelta>(kMapDeltaChannel, [&](const MapDelta& delta, const MessageInfo& info) {
+  const auto deltas = liar.Advertise(Shared(kMapDelta));
+  liar.Subscribe(kMapDelta, [&](const MapDelta& delta, const MessageInfo& info) {
     // So far ahead that it comes before the true one: logical time lets no more than a few be on their way.
     if (info.publisher == "mapper" && delta.number == 2) deltas.Publish({.number = 8, .answers = {8}, .hash = 7});
   });
@@ -246,7 +252,7 @@ TEST(MappingPipeline, AWrongDeltaIsReportedAndASnapshotMendsIt) {
 TEST(MappingPipeline, AKeyframeOutOfTurnEndsTheMapperWithASentence) {
   StackRun run;
   StageContext& other = run.bus().AddContext("other");
-  const auto keyframes = other.Advertise<KeyframeObservation>(kKeyframeChannel, Publishers::kMany);
+  const auto keyframes = other.Advertise(Shared(kKeyframe));
   run.Begin();
   ASSERT_TRUE(run.Reach(3));
   KeyframeObservation keyframe;

@@ -18,14 +18,14 @@ namespace tessera {
 namespace {
 
 constexpr int kNumFrames = 12;
-const CameraCalibration kCalibration{.sensor = SensorType::kStereo,
-                                     .width_px = 320,
-                                     .height_px = 240,
-                                     .fx_px = 300,
-                                     .fy_px = 300,
-                                     .cx_px = 160,
-                                     .cy_px = 120,
-                                     .baseline_m = 0.1};
+const CameraCalibration kRig{.sensor = SensorType::kStereo,
+                             .width_px = 320,
+                             .height_px = 240,
+                             .fx_px = 300,
+                             .fy_px = 300,
+                             .cx_px = 160,
+                             .cy_px = 120,
+                             .baseline_m = 0.1};
 
 CameraFrame Frame(int64_t id) {
   CameraFrame frame;
@@ -43,7 +43,7 @@ std::vector<FeatureFrame> Expected() {
   Extractor extractor;
   for (int64_t id = 0; id < kNumFrames; ++id) {
     std::vector<TileFeatures> tiles;
-    for (const TileJob& job : CutFrame(Frame(id), kCalibration, 0, {}, 4, FeatureOptions{})) {
+    for (const TileJob& job : CutFrame(Frame(id), kRig, 0, {}, 4, FeatureOptions{})) {
       tiles.push_back(extractor.Extract(job));
     }
     frames.push_back(SelectFeatures(tiles));
@@ -57,23 +57,23 @@ class Ends {
   explicit Ends(MemoryBus& bus)
       : camera_(bus.AddContext("camera")),
         tracker_(bus.AddContext("tracker")),
-        frames_(camera_.Advertise<CameraFrame>(kCameraChannel)),
-        calibration_(camera_.Advertise<CameraCalibration>(kCalibrationChannel)),
-        end_(camera_.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany)),
-        poses_(tracker_.Advertise<PoseEstimate>(kPoseChannel)) {
-    tracker_.Subscribe<FeatureFrame>(kFeaturesChannel, [this](const FeatureFrame& frame, const MessageInfo&) {
+        frames_(camera_.Advertise(kCamera)),
+        calibration_(camera_.Advertise(kCalibration)),
+        end_(camera_.Advertise(kEndOfStream)),
+        poses_(tracker_.Advertise(kPose)) {
+    tracker_.Subscribe(kFeatures, [this](const FeatureFrame& frame) {
       received_.push_back(frame);
       poses_.Publish({.frame = frame.frame});
     });
-    tracker_.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-      if (end.stage == "reassembler") end_of_features_ = end;
+    tracker_.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+      if (end.stage == StageKind::kReassembler) end_of_features_ = end;
     });
   }
 
   void SendAll() {
-    calibration_.Publish(kCalibration);
+    calibration_.Publish(kRig);
     for (int64_t id = 0; id < kNumFrames; ++id) frames_.Publish(Frame(id));
-    end_.Publish({.stage = "camera", .num_frames = kNumFrames});
+    end_.Publish({.stage = StageKind::kCamera, .num_frames = kNumFrames});
   }
   // The end may overtake the last frames, which travel on a channel of their own.
   bool Ended() const { return end_of_features_.has_value() && received_.size() >= kNumFrames; }
@@ -85,7 +85,7 @@ class Ends {
       EXPECT_EQ(received_[i].frame, expected[i].frame);
       EXPECT_EQ(received_[i].keypoints, expected[i].keypoints);
       EXPECT_EQ(received_[i].descriptors, expected[i].descriptors);
-      EXPECT_EQ(received_[i].calibration, kCalibration);
+      EXPECT_EQ(received_[i].calibration, kRig);
     }
     EXPECT_EQ(end_of_features_->num_frames, kNumFrames);
     EXPECT_EQ(end_of_features_->num_dropped, 0);

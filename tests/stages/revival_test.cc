@@ -82,11 +82,8 @@ class StackRun {
   explicit StackRun(int64_t num_frames = kNumFrames, double keyframe_min_share = 0.9)
       : bus_(SettingsOf(folder_, num_frames, keyframe_min_share)) {
     StageContext& probe = bus_.AddContext("probe");
-    probe.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
-      last_pose_ = std::max(last_pose_, pose.frame);
-    });
-    probe.Subscribe<MapSnapshotPage>(
-        kMapSnapshotChannel, [this](const MapSnapshotPage& page, const MessageInfo&) { snapshot_ = page.part.number; });
+    probe.Subscribe(kPose, [this](const PoseEstimate& pose) { last_pose_ = std::max(last_pose_, pose.frame); });
+    probe.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) { snapshot_ = page.part.number; });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<MapperStage>("mapper");
     bus_.Start<TrackerStage>("tracker");

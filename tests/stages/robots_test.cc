@@ -80,24 +80,24 @@ class RobotStack {
     bus.Start<ReassemblerStage>(robot_.prefix + "reassembler", 0, own);
     bus.Start<DispatcherStage>(robot_.prefix + "dispatcher", 0, own);
     StageContext& camera = bus.AddContext(robot_.prefix + "camera", 0, own);
-    frames_ = camera.Advertise<CameraFrame>(kCameraChannel);
-    calibration_ = camera.Advertise<CameraCalibration>(kCalibrationChannel);
-    end_ = camera.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
+    frames_ = camera.Advertise(kCamera);
+    calibration_ = camera.Advertise(kCalibration);
+    end_ = camera.Advertise(kEndOfStream);
     StageContext& tracker = bus.AddContext(robot_.prefix + "tracker", 0, own);
-    poses_ = tracker.Advertise<PoseEstimate>(kPoseChannel);
-    tracker.Subscribe<FeatureFrame>(kFeaturesChannel, [this](const FeatureFrame& frame, const MessageInfo&) {
+    poses_ = tracker.Advertise(kPose);
+    tracker.Subscribe(kFeatures, [this](const FeatureFrame& frame) {
       received_.push_back(frame);
       poses_.Publish({.frame = frame.frame});
     });
-    tracker.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-      if (end.stage == "reassembler") features_ended_ = true;
+    tracker.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+      if (end.stage == StageKind::kReassembler) features_ended_ = true;
     });
   }
 
   void SendAll() {
     calibration_.Publish(CalibrationOf(robot_));
     for (int64_t id = 0; id < robot_.num_frames; ++id) frames_.Publish(FrameOf(robot_, id));
-    end_.Publish({.stage = "camera", .num_frames = robot_.num_frames});
+    end_.Publish({.stage = StageKind::kCamera, .num_frames = robot_.num_frames});
   }
   void Kill() {
     for (const char* stage : {"reassembler", "dispatcher", "camera", "tracker"}) bus_.Kill(robot_.prefix + stage);

@@ -92,7 +92,7 @@ bool AreSame(const GroundTruthPose& a, const GroundTruthPose& b) {
 
 template <>
 EndOfStream DrawValue<EndOfStream>(std::mt19937& generator, int) {
-  return {.stage = "camera",
+  return {.stage = StageKind::kCamera,
           .num_frames = Draw(generator, 10, 999),
           .num_dropped = Draw(generator, 0, 10),
           .num_values = Draw(generator, 0, 999)};

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "messages/topics.h"
 #include "wire/codec.h"
+#include "wire/map_file.h"
 
 namespace tessera {
 

@@ -23,15 +23,11 @@ std::string Decode(const std::vector<Bytes>& messages, Value* decoded) {
   for (const Bytes& message : messages) {
     const auto header = ReadHeader(message);
     if (!header) return "no header";
-    switch (joiner.Add(message, *header)) {
-      case ValueJoiner<Value>::Result::kComplete:
-        *decoded = joiner.value();
-        return &message == &messages.back() ? "" : "complete too early";
-      case ValueJoiner<Value>::Result::kRefused:
-        return joiner.problem();
-      case ValueJoiner<Value>::Result::kIncomplete:
-        break;
-    }
+    const Result<const Value*> value = joiner.Add(message, *header);
+    if (!value) return value.error().sentence;
+    if (*value == nullptr) continue;
+    *decoded = **value;
+    return &message == &messages.back() ? "" : "complete too early";
   }
   return "incomplete";
 }
@@ -108,12 +104,12 @@ TEST(Codec, InterruptedValueIsLostAndTheNextOneComes) {
   (void)joiner.Add(messages[0], *ReadHeader(messages[0]));
   EXPECT_TRUE(joiner.Interrupt());
   for (size_t i = 1; i < messages.size(); ++i) {
-    EXPECT_EQ(joiner.Add(messages[i], *ReadHeader(messages[i])), ValueJoiner<CameraFrame>::Result::kIncomplete);
+    EXPECT_EQ(joiner.Add(messages[i], *ReadHeader(messages[i])), nullptr);
   }
-  auto result = ValueJoiner<CameraFrame>::Result::kIncomplete;
-  for (const Bytes& message : messages) result = joiner.Add(message, *ReadHeader(message));
-  EXPECT_EQ(result, ValueJoiner<CameraFrame>::Result::kComplete);
-  EXPECT_EQ(joiner.value(), frame);
+  Result<const CameraFrame*> value = nullptr;
+  for (const Bytes& message : messages) value = joiner.Add(message, *ReadHeader(message));
+  ASSERT_TRUE(value && *value != nullptr);
+  EXPECT_EQ(**value, frame);
 }
 
 // Each change makes the value invalid, and the decoder must say so.
@@ -287,7 +283,7 @@ TEST(Codec, HeadersOutOfRangeAreRefused) {
   const auto is_refused = [](void (*change)(MessageHeader& header)) {
     MessageHeader header = ExampleHeader();
     change(header);
-    return !ReadHeader(EncodeValue(EndOfStream{.stage = "camera"}, header, 60000)[0]);
+    return !ReadHeader(EncodeValue(EndOfStream{.stage = StageKind::kCamera}, header, 60000)[0]);
   };
   EXPECT_FALSE(is_refused([](MessageHeader&) {}));
   EXPECT_TRUE(is_refused([](MessageHeader& header) { header.publisher = ""; }));

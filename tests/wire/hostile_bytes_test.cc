@@ -64,8 +64,8 @@ struct Attack {
         ++num_refused;
         continue;
       }
-      if (joiner.Add(message, *header) == ValueJoiner<Value>::Result::kRefused) {
-        EXPECT_FALSE(joiner.problem().empty());
+      if (const auto value = joiner.Add(message, *header); !value) {
+        EXPECT_FALSE(value.error().sentence.empty());
         ++num_refused;
       }
       if (generator() % 2 == 0) (void)joiner.Add(messages[0], *ReadHeader(messages[0]));
@@ -80,7 +80,7 @@ TEST(HostileBytes, EveryDecoderStands) { ForEachValueType(Attack()); }
 TEST(HostileBytes, OtherTypesAreRefused) {
   const Bytes pose = EncodeValue(PoseEstimate{.frame = {1}}, ExampleHeader(), 4000)[0];
   ValueJoiner<EndOfStream> joiner;
-  EXPECT_EQ(joiner.Add(pose, *ReadHeader(pose)), ValueJoiner<EndOfStream>::Result::kRefused);
+  EXPECT_FALSE(joiner.Add(pose, *ReadHeader(pose)));
 }
 
 }  // namespace

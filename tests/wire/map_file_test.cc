@@ -10,7 +10,7 @@
 #include <string>
 
 #include "core/errors.h"
-#include "messages/channels.h"
+#include "messages/topics.h"
 #include "support/map_changes.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
@@ -126,8 +126,9 @@ TEST_F(MapFileTest, AnotherVersionIsNamed) {
   LogFileReader reader(path_);
   for (LogEvent event; reader.Next(&event);) events.push_back(event);
   ValueJoiner<MapFileHeader> joiner;
-  ASSERT_EQ(joiner.Add(events[0].data, *ReadHeader(events[0].data)), ValueJoiner<MapFileHeader>::Result::kComplete);
-  MapFileHeader header = joiner.value();
+  const Result<const MapFileHeader*> first = joiner.Add(events[0].data, *ReadHeader(events[0].data));
+  ASSERT_TRUE(first && *first != nullptr);
+  MapFileHeader header = **first;
   ++header.version;
   LogFileWriter writer(path_);
   writer.Write(0, events[0].channel, EncodeValue(header, {.publisher = "map_file", .epoch_us = 1}, 60000).front());

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/errors.h"
-#include "messages/channels.h"
+#include "messages/topics.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
 

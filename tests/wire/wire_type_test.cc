@@ -89,14 +89,12 @@ TEST(WireType, LengthsOfArraysAreNotBelieved) {
 }
 
 TEST(WireType, TextsMustEndAndHaveNoControlCharacters) {
-  const auto message = [](const std::string& stage) {
-    return EncodeValue(EndOfStream{.stage = stage}, ExampleHeader(), 2000)[0];
-  };
-  EXPECT_TRUE(ReadHeader(message("camera")));
-  Bytes with_escape = message("camera");
+  const Bytes message = EncodeValue(EndOfStream{.stage = StageKind::kCamera}, ExampleHeader(), 2000)[0];
+  EXPECT_TRUE(ReadHeader(message));
+  Bytes with_escape = message;
   *std::search(with_escape.begin(), with_escape.end(), "camera", "camera" + 6) = 0x1B;
   EXPECT_FALSE(ReadHeader(with_escape));
-  Bytes unterminated = message("camera");
+  Bytes unterminated = message;
   *(std::search(unterminated.begin(), unterminated.end(), "camera", "camera" + 6) + 6) = 'x';
   EXPECT_FALSE(ReadHeader(unterminated));
 }

@@ -63,11 +63,11 @@ CameraStage::CameraStage(StageContext& context)
   for (const std::string& note : source_->notes()) {
     context.Info(note);
   }
-  calibration_ = context.Advertise<CameraCalibration>(kCalibrationChannel);
-  ground_truth_ = context.Advertise<GroundTruthPose>(kGroundTruthChannel);
-  frames_ = context.Advertise<CameraFrame>(kCameraChannel);
-  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+  calibration_ = context.Advertise(kCalibration);
+  ground_truth_ = context.Advertise(kGroundTruth);
+  frames_ = context.Advertise(kCamera);
+  end_of_stream_ = context.Advertise(kEndOfStream);
+  context.Subscribe(kPose, [this](const PoseEstimate& pose) {
     if (pose.frame > tracked_) {
       tracked_ = pose.frame;
       tracked_utime_us_ = pose.utime_us;
@@ -162,7 +162,7 @@ void CameraStage::End() {
   has_ended_ = true;
   last_sent_ = std::max(last_sent_, tracked_);
   SendGroundTruthUpTo(last_sent_);
-  end_of_stream_.Publish({.stage = "camera", .num_frames = last_sent_.value + 1, .num_dropped = 0});
+  end_of_stream_.Publish({.stage = StageKind::kCamera, .num_frames = last_sent_.value + 1, .num_dropped = 0});
 }
 
 void CameraStage::WatchPoses() {

@@ -39,21 +39,17 @@ WorkQueueOptions OptionsFrom(const Settings& settings) {
 }  // namespace
 
 DispatcherStage::DispatcherStage(StageContext& context) : context_(context), queue_(OptionsFrom(context.settings())) {
-  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  context.Subscribe<CameraCalibration>(kCalibrationChannel, [this](const CameraCalibration& calibration,
-                                                                   const MessageInfo&) { OnCalibration(calibration); });
-  context.Subscribe<CameraFrame>(kCameraChannel,
-                                 [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
-  context.Subscribe<ExtractorReady>(kExtractorReadyChannel, [this](const ExtractorReady& ready, const MessageInfo&) {
+  end_of_stream_ = context.Advertise(kEndOfStream);
+  context.Subscribe(kCalibration, [this](const CameraCalibration& calibration) { OnCalibration(calibration); });
+  context.Subscribe(kCamera, [this](const CameraFrame& frame, const MessageInfo& info) { OnFrame(frame, info); });
+  context.Subscribe(kExtractorReady, [this](const ExtractorReady& ready) {
     queue_.HearExtractor(ready.extractor, ready.epoch_us, context_.now_us(), ready.num_robots);
     GiveWork();
   });
-  context.Subscribe<TileAck>(kTileAckChannel,
-                             [this](const TileAck& ack, const MessageInfo& info) { OnAck(ack, info); });
-  context.Subscribe<PoseEstimate>(kPoseChannel,
-                                  [this](const PoseEstimate& pose, const MessageInfo&) { OnPose(pose.frame); });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage == "camera" && !source_end_) {
+  context.Subscribe(kTileAck, [this](const TileAck& ack, const MessageInfo& info) { OnAck(ack, info); });
+  context.Subscribe(kPose, [this](const PoseEstimate& pose) { OnPose(pose.frame); });
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage == StageKind::kCamera && !source_end_) {
       source_end_ = end;
       last_activity_us_ = context_.now_us();
       FinishIfDone();
@@ -181,7 +177,7 @@ void DispatcherStage::GiveWork() {
     const StepTimer timer(context_);
     const auto [extractor, job] = queue_.GiveNext(context_.now_us());
     if (!tiles_.contains(extractor)) {
-      tiles_[extractor] = context_.Advertise<TileJob>(TileChannel(extractor));
+      tiles_[extractor] = context_.Advertise(TileTopic(extractor));
     }
     tiles_[extractor].Publish(*job);
   }
@@ -216,7 +212,7 @@ void DispatcherStage::FinishIfDone() {
   }
   const int64_t num_missing = std::max<int64_t>(0, source_end_->num_frames - (newest_.value + 1));
   context_.AddDropped(num_missing);
-  end_of_stream_.Publish({.stage = "dispatcher",
+  end_of_stream_.Publish({.stage = StageKind::kDispatcher,
                           .num_frames = queue_.last_frame().value + 1,
                           .num_dropped = source_end_->num_dropped + num_dropped_ + num_missing});
   context_.Finish();

@@ -42,25 +42,21 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
                        "; choose another folder");
     }
   }
-  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo& info) {
+  context.Subscribe(kPose, [this](const PoseEstimate& pose, const MessageInfo& info) {
     record_.AddPose(pose, info.publish_us);
     last_pose_ = std::max(last_pose_, pose.frame);
     last_news_us_ = context_.now_us();
     FinishIfDone();
   });
   // One that was started again begins with a snapshot of the map, which does not hold all that poses are relative to.
-  context.Subscribe<RemovedInDelta>(kRemovedKeyframesChannel,
-                                    [this](const RemovedInDelta& removed, const MessageInfo&) {
-                                      record_.AddRemoved(removed);
-                                      num_removals_known_ = std::max(num_removals_known_, removed.delta + 1);
-                                      FinishIfDone();
-                                    });
-  context.Subscribe<GroundTruthPose>(
-      kGroundTruthChannel, [this](const GroundTruthPose& truth, const MessageInfo&) { record_.AddGroundTruth(truth); });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel,
-                                 [this](const EndOfStream& end, const MessageInfo&) { OnEnd(end); });
-  context.Subscribe<StageStatus>(kStatusChannel,
-                                 [this](const StageStatus& status, const MessageInfo&) { OnStatus(status); });
+  context.Subscribe(kRemovedKeyframes, [this](const RemovedInDelta& removed) {
+    record_.AddRemoved(removed);
+    num_removals_known_ = std::max(num_removals_known_, removed.delta + 1);
+    FinishIfDone();
+  });
+  context.Subscribe(kGroundTruth, [this](const GroundTruthPose& truth) { record_.AddGroundTruth(truth); });
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) { OnEnd(end); });
+  context.Subscribe(kStatus, [this](const StageStatus& status) { OnStatus(status); });
   context.Every(std::chrono::milliseconds(50), [this] { FinishIfDone(); });
 }
 
@@ -81,10 +77,10 @@ void EvaluatorStage::OnStatus(const StageStatus& status) {
 }
 
 void EvaluatorStage::OnEnd(const EndOfStream& end) {
-  if (end.stage == "tracker" && !end_) {
+  if (end.stage == StageKind::kTracker && !end_) {
     end_ = end;
     record_.SetEnd(end.num_frames, end.num_dropped);
-  } else if (end.stage == "mapper" && !mapper_end_) {
+  } else if (end.stage == StageKind::kMapper && !mapper_end_) {
     mapper_end_ = end;
     map_.Expect(end.num_values);
   } else {

@@ -65,12 +65,10 @@ void ExtractorStage::ServeOthers() {
 void ExtractorStage::Serve(size_t robot) {
   StageContext& context = *robots_[robot].context;
   robots_[robot].is_served = true;
-  robots_[robot].features = context.Advertise<TileFeatures>(kTileFeaturesChannel, Publishers::kMany);
-  robots_[robot].ready = context.Advertise<ExtractorReady>(kExtractorReadyChannel, Publishers::kMany);
-  context.Subscribe<TileJob>(TileChannel(context.id()),
-                             [this, robot](const TileJob& job, const MessageInfo&) { OnJob(robot, job); });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel,
-                                 [this, robot](const EndOfStream& end, const MessageInfo&) { OnEnd(robot, end); });
+  robots_[robot].features = context.Advertise(kTileFeatures);
+  robots_[robot].ready = context.Advertise(kExtractorReady);
+  context.Subscribe(TileTopic(context.id()), [this, robot](const TileJob& job) { OnJob(robot, job); });
+  context.Subscribe(kEndOfStream, [this, robot](const EndOfStream& end) { OnEnd(robot, end); });
 }
 
 void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
@@ -95,7 +93,7 @@ void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
 }
 
 void ExtractorStage::OnEnd(size_t robot, const EndOfStream& end) {
-  if (end.stage != "dispatcher") return;
+  if (end.stage != StageKind::kDispatcher) return;
   if (is_pool()) {
     robots_[robot].features.Forget();  // all its answers have arrived
   } else {

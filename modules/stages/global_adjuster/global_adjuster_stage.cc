@@ -19,9 +19,9 @@ BundleOptions OptionsFrom(const Settings& settings) {
 
 GlobalAdjusterStage::GlobalAdjusterStage(StageContext& context)
     : context_(context), options_(OptionsFrom(context.settings())), map_(context, true, [this] { OnDeltas(); }) {
-  adjustments_ = context.Advertise<GlobalAdjustment>(kGlobalAdjustmentChannel);
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage != "mapper") return;
+  adjustments_ = context.Advertise(kGlobalAdjustment);
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage != StageKind::kMapper) return;
     mapper_end_ = end;
     map_.Expect(end.num_values);
     FinishIfDone();

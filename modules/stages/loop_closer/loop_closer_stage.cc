@@ -33,15 +33,14 @@ LoopCloserStage::LoopCloserStage(StageContext& context)
       closes_loops_(context.settings().Get<bool>("mapper.close_loops")),
       loop_delay_keyframes_(context.settings().Get<int>("mapper.loop_delay_keyframes")),
       map_(context, true, [this] { OnDeltas(); }) {
-  results_ = context.Advertise<LoopResult>(kLoopResultChannel);
-  answers_ = context.Advertise<RelocalizationAnswer>(kRelocalizationChannel);
-  context.Subscribe<RelocalizationRequest>(kRelocalizationRequestChannel,
-                                           [this](const RelocalizationRequest& request, const MessageInfo&) {
-                                             requests_.push_back(request);
-                                             AnswerRequests();
-                                           });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage != "mapper") return;
+  results_ = context.Advertise(kLoopResult);
+  answers_ = context.Advertise(kRelocalization);
+  context.Subscribe(kRelocalizationRequest, [this](const RelocalizationRequest& request) {
+    requests_.push_back(request);
+    AnswerRequests();
+  });
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage != StageKind::kMapper) return;
     mapper_end_ = end;
     map_.Expect(end.num_values);
     FinishIfDone();

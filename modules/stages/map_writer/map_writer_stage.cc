@@ -24,8 +24,8 @@ MapWriterStage::MapWriterStage(StageContext& context)
       path_(PathFrom(context.settings())),
       follows_(context.settings().Get<bool>("map_writer.follow")),
       map_(context, true, [this] { OnDeltas(); }) {
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage != "mapper") return;
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage != StageKind::kMapper) return;
     mapper_end_ = end;
     map_.Expect(end.num_values);
     WriteIfDone();

@@ -52,26 +52,23 @@ MapperStage::MapperStage(StageContext& context)
       closes_loops_(context.settings().Get<bool>("mapper.close_loops")),
       schedule_(DelaysFrom(context.settings())) {
   if (const auto path = context.settings().Get<std::string>("mapper.load_map"); !path.empty()) Load(path);
-  deltas_ = context.Advertise<MapDelta>(kMapDeltaChannel);
-  removed_ = context.Advertise<RemovedInDelta>(kRemovedKeyframesChannel);
+  deltas_ = context.Advertise(kMapDelta);
+  removed_ = context.Advertise(kRemovedKeyframes);
   if (mapper_.map().next_delta() > 0) removed_.Publish({.delta = mapper_.map().next_delta() - 1, .ties = {}});
-  pages_ = context.Advertise<MapSnapshotPage>(kMapSnapshotChannel);
-  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  context.Subscribe<KeyframeObservation>(
-      kKeyframeChannel, [this](const KeyframeObservation& keyframe, const MessageInfo&) { OnKeyframe(keyframe); });
-  context.Subscribe<LoopResult>(kLoopResultChannel, [this](const LoopResult& result, const MessageInfo&) {
+  pages_ = context.Advertise(kMapSnapshot);
+  end_of_stream_ = context.Advertise(kEndOfStream);
+  context.Subscribe(kKeyframe, [this](const KeyframeObservation& keyframe) { OnKeyframe(keyframe); });
+  context.Subscribe(kLoopResult, [this](const LoopResult& result) {
     schedule_.Receive(result);
     ProcessWaiting();
   });
-  context.Subscribe<GlobalAdjustment>(kGlobalAdjustmentChannel,
-                                      [this](const GlobalAdjustment& adjustment, const MessageInfo&) {
-                                        schedule_.Receive(adjustment);
-                                        ProcessWaiting();
-                                      });
-  context.Subscribe<MapRequest>(kMapRequestChannel,
-                                [this](const MapRequest& request, const MessageInfo&) { OnRequest(request); });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage == "tracker") {
+  context.Subscribe(kGlobalAdjustment, [this](const GlobalAdjustment& adjustment) {
+    schedule_.Receive(adjustment);
+    ProcessWaiting();
+  });
+  context.Subscribe(kMapRequest, [this](const MapRequest& request) { OnRequest(request); });
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage == StageKind::kTracker) {
       tracker_end_ = end;
       ProcessWaiting();
     }
@@ -145,7 +142,7 @@ void MapperStage::FinishIfDone() {
     if (!delta) break;
     Publish(std::move(*delta));
   }
-  end_of_stream_.Publish({.stage = "mapper",
+  end_of_stream_.Publish({.stage = StageKind::kMapper,
                           .num_frames = tracker_end_->num_frames,
                           .num_dropped = tracker_end_->num_dropped,
                           .num_values = mapper_.map().next_delta()});

@@ -19,18 +19,17 @@ int MaxOpenFrames(const Settings& settings) {
 
 ReassemblerStage::ReassemblerStage(StageContext& context)
     : context_(context), assembler_(MaxOpenFrames(context.settings())) {
-  features_ = context.Advertise<FeatureFrame>(kFeaturesChannel);
-  acks_ = context.Advertise<TileAck>(kTileAckChannel);
-  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  context.Subscribe<TileFeatures>(kTileFeaturesChannel,
-                                  [this](const TileFeatures& tile, const MessageInfo&) { OnTile(tile); });
+  features_ = context.Advertise(kFeatures);
+  acks_ = context.Advertise(kTileAck);
+  end_of_stream_ = context.Advertise(kEndOfStream);
+  context.Subscribe(kTileFeatures, [this](const TileFeatures& tile) { OnTile(tile); });
   // One that was started again goes on behind what is tracked.
-  context.Subscribe<PoseEstimate>(kPoseChannel, [this](const PoseEstimate& pose, const MessageInfo&) {
+  context.Subscribe(kPose, [this](const PoseEstimate& pose) {
     assembler_.SkipTo(pose.frame);
     Release();
   });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage == "dispatcher") {
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage == StageKind::kDispatcher) {
       dispatcher_end_ = end;
       FinishIfDone();
     }
@@ -76,8 +75,9 @@ void ReassemblerStage::FinishIfDone() {
   if (context_.finished() || !dispatcher_end_ || assembler_.last_released().value + 1 < dispatcher_end_->num_frames) {
     return;
   }
-  end_of_stream_.Publish(
-      {.stage = "reassembler", .num_frames = dispatcher_end_->num_frames, .num_dropped = dispatcher_end_->num_dropped});
+  end_of_stream_.Publish({.stage = StageKind::kReassembler,
+                          .num_frames = dispatcher_end_->num_frames,
+                          .num_dropped = dispatcher_end_->num_dropped});
   context_.Finish();
 }
 

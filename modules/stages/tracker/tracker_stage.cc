@@ -54,28 +54,27 @@ TrackerStage::TrackerStage(StageContext& context)
       may_ask_(context.settings().Get<bool>("tracker.relocalize")),
       awaits_loaded_map_(!context.settings().Get<std::string>("mapper.load_map").empty()),
       map_(context, awaits_loaded_map_, [this] { OnDeltas(); }) {
-  poses_ = context.Advertise<PoseEstimate>(kPoseChannel);
-  keyframes_ = context.Advertise<KeyframeObservation>(kKeyframeChannel);
-  end_of_stream_ = context.Advertise<EndOfStream>(kEndOfStreamChannel, Publishers::kMany);
-  requests_ = context.Advertise<RelocalizationRequest>(kRelocalizationRequestChannel);
-  context.Subscribe<RelocalizationAnswer>(kRelocalizationChannel,
-                                          [this](const RelocalizationAnswer& answer, const MessageInfo&) {
-                                            if (!answer_ || answer.frame > answer_->frame) answer_ = answer;
-                                            TrackWaiting();
-                                          });
+  poses_ = context.Advertise(kPose);
+  keyframes_ = context.Advertise(kKeyframe);
+  end_of_stream_ = context.Advertise(kEndOfStream);
+  requests_ = context.Advertise(kRelocalizationRequest);
+  context.Subscribe(kRelocalization, [this](const RelocalizationAnswer& answer) {
+    if (!answer_ || answer.frame > answer_->frame) answer_ = answer;
+    TrackWaiting();
+  });
   // A loop closer that was started again did not hear the question.
   context.Every(kAskAgain, [this] {
     if (asked_ && !IsAnswered()) requests_.Publish(*asked_);
   });
-  context.Subscribe<FeatureFrame>(kFeaturesChannel, [this](const FeatureFrame& features, const MessageInfo&) {
+  context.Subscribe(kFeatures, [this](const FeatureFrame& features) {
     if (features.frame <= last_received_)
       return;  // a reassembler that was started again repeats what isn't tracked yet
     last_received_ = features.frame;
     waiting_.push_back(features);
     TrackWaiting();
   });
-  context.Subscribe<EndOfStream>(kEndOfStreamChannel, [this](const EndOfStream& end, const MessageInfo&) {
-    if (end.stage == "reassembler") {
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    if (end.stage == StageKind::kReassembler) {
       features_end_ = end;
       FinishIfDone();
     }
@@ -196,7 +195,7 @@ void TrackerStage::FinishIfDone() {
   if (context_.finished() || !features_end_ || last_frame_.value + 1 < features_end_->num_frames) {
     return;
   }
-  end_of_stream_.Publish({.stage = "tracker",
+  end_of_stream_.Publish({.stage = StageKind::kTracker,
                           .num_frames = features_end_->num_frames,
                           .num_dropped = features_end_->num_dropped,
                           .num_values = num_keyframes_});
