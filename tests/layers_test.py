@@ -98,5 +98,5 @@ def test_pure_modules_have_no_clock_and_no_threads() -> None:
 
 
 @pytest.mark.parametrize("line, header", [('#include "a/b.h"', "a/b.h"), ("  #  include <lcm/lcm.h>", "lcm/lcm.h")])
-def test_includes_are_recognised(line, header) -> None:
+def test_includes_are_recognized(line: str, header: str) -> None:
     assert INCLUDE.findall(line)[0][1] == header
