@@ -13,7 +13,9 @@ LCM_HEADER = re.compile(r"^(lcm/|tessera/\w+_t\.hpp$|tessera/type_texts\.h$)")
 def layers() -> list[str]:
     """Bottom to top, from the list that the build itself follows."""
     text = (MODULES / "CMakeLists.txt").read_text()
-    return re.search(r"foreach\(module ([a-z_ \n]+)\)", text)[1].split()
+    match = re.search(r"foreach\(module ([a-z_ \n]+)\)", text)
+    assert match
+    return match[1].split()
 
 
 def sources() -> list[Path]:

@@ -4,22 +4,18 @@ import datetime
 import json
 import os
 import platform
-import re
 import subprocess
 from pathlib import Path
 
 from tessera_cli.files import BUILD, ROOT
 
-VERSION = re.compile(r"^\s*project\(\s*tessera\s+VERSION\s+([0-9.]+)", re.MULTILINE)
-
 
 def tessera_version() -> str:
-    """As in project() of CMakeLists.txt, the only place where it is written; "unknown" if it is not there."""
+    """Of the file VERSION, which CMake reads too; "unknown" if there is none."""
     try:
-        match = VERSION.search((ROOT / "CMakeLists.txt").read_text())
+        return (ROOT / "VERSION").read_text().strip()
     except OSError:
-        match = None
-    return match[1] if match else "unknown"
+        return "unknown"
 
 
 def collect_versions() -> dict[str, str]:
