@@ -30,8 +30,8 @@ GlobalAdjusterStage::GlobalAdjusterStage(StageContext& context)
 
 void GlobalAdjusterStage::OnDeltas() {
   for (const auto& delta : map_.Take()) {
-    if (const std::string problem = replica_.Apply(*delta); !problem.empty()) {
-      map_.Reject(problem);
+    if (const Result<> applied = replica_.Apply(*delta); !applied) {
+      map_.Reject(applied.error().sentence);
       return;
     }
     if (!delta->asks_adjustment) continue;

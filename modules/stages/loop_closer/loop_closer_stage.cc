@@ -49,8 +49,8 @@ LoopCloserStage::LoopCloserStage(StageContext& context)
 
 void LoopCloserStage::OnDeltas() {
   for (const auto& delta : map_.Take()) {
-    if (const std::string problem = loop_closer_.ApplyDelta(*delta); !problem.empty()) {
-      map_.Reject(problem);
+    if (const Result<> applied = loop_closer_.ApplyDelta(*delta); !applied) {
+      map_.Reject(applied.error().sentence);
       return;
     }
     if (closes_loops_) FindLoop(*delta);

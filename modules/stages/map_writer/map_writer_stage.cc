@@ -34,8 +34,8 @@ MapWriterStage::MapWriterStage(StageContext& context)
 
 void MapWriterStage::OnDeltas() {
   for (const auto& delta : map_.Take()) {
-    if (const std::string problem = replica_.Apply(*delta); !problem.empty()) {
-      map_.Reject(problem);
+    if (const Result<> applied = replica_.Apply(*delta); !applied) {
+      map_.Reject(applied.error().sentence);
       return;
     }
     context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));

@@ -77,9 +77,7 @@ MapperStage::MapperStage(StageContext& context)
 
 // The map goes on where it ended: with the next number of keyframes.
 void MapperStage::Load(const std::string& path) {
-  if (const std::string problem = mapper_.Load(ReadMapFile(path)); !problem.empty()) {
-    throw InputError("map file " + path + " is damaged: " + problem);
-  }
+  ThrowIfFailed<InputError>(mapper_.Load(ReadMapFile(path)), "map file " + path + " is damaged: ");
   archive_.Begin(mapper_.map());
   places_.Begin(mapper_.map());
   next_keyframe_ = {mapper_.map().answered().value + 1};

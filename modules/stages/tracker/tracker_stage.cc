@@ -20,9 +20,7 @@ MapTrackerOptions OptionsFrom(const Settings& settings) {
   options.keyframes.min_share = settings.Get<double>("tracker.keyframe_min_share");
   options.keyframes.min_parallax_rad = settings.Get<double>("tracker.keyframe_min_parallax_rad");
   options.keyframes.max_interval_us = std::llround(1e6 * settings.Get<double>("tracker.keyframe_max_interval_s"));
-  if (const std::string problem = options.Check(); !problem.empty()) {
-    throw InputError(problem);
-  }
+  ThrowIfFailed<InputError>(options.Check(), "tracker: ");
   return options;
 }
 
@@ -85,11 +83,11 @@ void TrackerStage::OnDeltas() {
   for (const auto& delta : map_.Take()) {
     if (!delta->is_snapshot) {
       schedule_.Receive(delta);
-    } else if (const std::string problem = tracker_.ApplyDelta(*delta); problem.empty()) {
+    } else if (const Result<> applied = tracker_.ApplyDelta(*delta); applied) {
       schedule_.SkipTo(*delta);
       awaits_loaded_map_ = false;
     } else {
-      map_.Reject(problem);
+      map_.Reject(applied.error().sentence);
     }
   }
   TrackWaiting();
@@ -121,8 +119,8 @@ std::optional<MapTrackingResult> TrackerStage::Step(const FeatureFrame& features
   if (!FitsMap(features.calibration)) return std::nullopt;
   const StepTimer timer(context_);
   for (const auto& delta : schedule_.Take(features.frame)) {
-    if (const std::string problem = tracker_.ApplyDelta(*delta); !problem.empty()) {
-      map_.Reject(problem);
+    if (const Result<> applied = tracker_.ApplyDelta(*delta); !applied) {
+      map_.Reject(applied.error().sentence);
       return std::nullopt;
     }
   }
