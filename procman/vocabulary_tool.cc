@@ -60,9 +60,8 @@ void Print(const Vocabulary& vocabulary) {
 }
 
 void Train(const Arguments& arguments) {
-  for (const std::string& problem : {arguments.vocabulary.Check(), arguments.features.Check()}) {
-    if (!problem.empty()) throw InputError(problem);
-  }
+  if (const std::string problem = arguments.vocabulary.Check(); !problem.empty()) throw InputError(problem);
+  ThrowIfFailed<InputError>(arguments.features.Check());
   const std::vector<std::vector<Descriptor>> images = CollectDescriptors(arguments);
   size_t num_descriptors = 0;
   for (const auto& image : images) num_descriptors += image.size();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 
 namespace tessera {
@@ -21,5 +22,8 @@ using FrameId = Id<struct FrameTag>;
 using KeyframeId = Id<struct KeyframeTag>;
 // Names a landmark (map point).
 using LandmarkId = Id<struct LandmarkTag>;
+
+// A position that is not negative, such as a keypoint's, as an index into a vector.
+constexpr size_t Index(int32_t position) { return static_cast<size_t>(position); }
 
 }  // namespace tessera

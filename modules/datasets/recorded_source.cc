@@ -89,9 +89,7 @@ void RecordedSource::PrepareRectifier(const SourceOptions& options) {
   RequireSize(first_left_.width, first_left_.height, rig.left.width_px, rig.left.height_px,
               "image " + recording_.left->Name(first_));
   rectifier_ = std::make_unique<Rectifier>(rig, sensor_);
-  if (const std::string problem = calibration().Check(); !problem.empty()) {
-    throw InputError("the calibration of " + options.source + " can't be used: " + problem);
-  }
+  ThrowIfFailed<InputError>(calibration().Check(), "the calibration of " + options.source + " can't be used: ");
 }
 
 // world_from_rectified = world_from_left * left_from_rectified

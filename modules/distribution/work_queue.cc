@@ -19,7 +19,8 @@ std::string WorkQueueOptions::Check() const {
   if (jobs_per_extractor < 1) return "dispatcher.jobs_per_extractor must be at least 1";
   if (coarse_levels_from < 1) return "dispatcher.coarse_levels_from must be at least 1";
   if (late_us <= 0 || silent_us <= 0) return "dispatcher.late_ms and dispatcher.silent_ms must be positive";
-  return features.Check();
+  const Result<> checked = features.Check();
+  return checked ? "" : checked.error().sentence;
 }
 
 WorkQueue::WorkQueue(const WorkQueueOptions& options) : options_(options) {}

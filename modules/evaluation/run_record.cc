@@ -20,7 +20,7 @@ void RunRecord::AddPose(const PoseEstimate& pose, int64_t publish_us) {
   poses_.try_emplace(pose.frame, pose, publish_us);
 }
 
-std::string RunRecord::ApplyDelta(const MapDelta& delta) {
+Result<> RunRecord::ApplyDelta(const MapDelta& delta) {
   removed_.Remember(map_, delta);
   return map_.Apply(delta);
 }

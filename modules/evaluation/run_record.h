@@ -57,7 +57,7 @@ class RunRecord {
   // What comes twice counts once: the first.
   void AddPose(const PoseEstimate& pose, int64_t publish_us);
   // The next change of the map. Returns Map::Apply's sentence.
-  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
+  Result<> ApplyDelta(const MapDelta& delta);
   // What was removed from the map, also before the first change that came here.
   void AddRemoved(const RemovedInDelta& removed);
   void AddGroundTruth(const GroundTruthPose& truth);

@@ -28,7 +28,7 @@ bool IsWholeImage(const TileJob& job) {
 }  // namespace
 
 TileFeatures Extractor::Extract(const TileJob& job) {
-  if (const std::string error = CheckTileJob(job); !error.empty()) throw std::invalid_argument(error);
+  ThrowIfFailed<std::invalid_argument>(CheckTileJob(job));
   plan_ = PlanTile(job.calibration, job.options, job.core, job.first_level, job.last_level);
   BuildPyramids(job);
   DetectCandidates(job);

@@ -9,6 +9,7 @@
 
 #include "core/ids.h"
 #include "core/image.h"
+#include "core/result.h"
 #include "geometry/camera.h"
 
 namespace tessera {
@@ -24,9 +25,11 @@ struct FeatureOptions {
   int max_disparity_px = 128;  // stereo: widest search along the row, in level-0 pixels
 
   bool operator==(const FeatureOptions&) const = default;
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
+
+// The coarsest level of the pyramids that maps are made from.
+inline constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;
 
 using Descriptor = std::array<uint64_t, 4>;  // 256 binary tests; compare by Hamming distance
 

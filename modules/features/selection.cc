@@ -159,39 +159,40 @@ FeatureFrame SelectFeatures(const std::vector<TileFeatures>& tiles) {
   return frame;
 }
 
-std::string CheckTileFeatures(const TileFeatures& features) {
+Result<> CheckTileFeatures(const TileFeatures& features) {
   const std::string name = "the features of tile " + std::to_string(features.tile) + " of frame " +
                            std::to_string(features.frame.value) + ": ";
-  if (!features.frame.valid()) return name + "the frame number is negative";
+  if (!features.frame.valid()) return Failed(name + "the frame number is negative");
   if (features.num_tiles < 1 || features.tile < 0 || features.tile >= features.num_tiles) {
-    return name + "there are " + std::to_string(features.num_tiles) + " tiles";
+    return Failed(name + "there are " + std::to_string(features.num_tiles) + " tiles");
   }
-  if (const std::string error = features.calibration.Check(); !error.empty()) return name + error;
-  if (const std::string error = features.options.Check(); !error.empty()) return name + error;
+  for (const Result<>& checked : {features.calibration.Check(), features.options.Check()}) {
+    if (!checked) return Failed(name + checked.error().sentence);
+  }
   if (features.descriptors.size() != features.candidates.size()) {
-    return name + std::to_string(features.candidates.size()) + " candidates have " +
-           std::to_string(features.descriptors.size()) + " descriptors";
+    return Failed(name + std::to_string(features.candidates.size()) + " candidates have " +
+                  std::to_string(features.descriptors.size()) + " descriptors");
   }
   for (const Candidate& candidate : features.candidates) {
     if (candidate.level >= features.options.num_levels) {
-      return name + "a candidate's level " + std::to_string(candidate.level) + " does not exist";
+      return Failed(name + "a candidate's level " + std::to_string(candidate.level) + " does not exist");
     }
     const int width = LevelSize(features.calibration.width_px, candidate.level);
     const int height = LevelSize(features.calibration.height_px, candidate.level);
     if (candidate.x < kBorderPx || candidate.y < kBorderPx || candidate.x >= width - kBorderPx ||
         candidate.y >= height - kBorderPx) {
-      return name + "a candidate lies outside its level's image";
+      return Failed(name + "a candidate lies outside its level's image");
     }
     if (2 * std::abs(candidate.offset_x) > kCornerSubpixels || 2 * std::abs(candidate.offset_y) > kCornerSubpixels) {
-      return name + "a candidate's corner lies outside its pixel";
+      return Failed(name + "a candidate's corner lies outside its pixel");
     }
     if (!std::isfinite(candidate.right_x_px) ||
         candidate.right_x_px >= static_cast<float>(features.calibration.width_px) ||
         !std::isfinite(candidate.depth_m) || candidate.depth_m < 0.0F) {
-      return name + "a candidate's right column or depth is out of range";
+      return Failed(name + "a candidate's right column or depth is out of range");
     }
   }
-  return "";
+  return {};
 }
 
 }  // namespace tessera

@@ -26,8 +26,7 @@ std::vector<uint32_t> ChooseCandidates(const CameraCalibration& calibration, con
 // (CheckTileFeatures) and the list not empty.
 FeatureFrame SelectFeatures(const std::vector<TileFeatures>& tiles);
 
-// Empty if all values are in range, else one sentence that says which is not. To be asked before SelectFeatures where
-// the value came from outside.
-std::string CheckTileFeatures(const TileFeatures& features);
+// Whether all values are in range. To be asked before SelectFeatures where the value came from outside.
+Result<> CheckTileFeatures(const TileFeatures& features);
 
 }  // namespace tessera

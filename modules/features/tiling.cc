@@ -28,31 +28,43 @@ bool HasSize(const Image<Pixel>& image, int width, int height) {
          image.pixels.size() == static_cast<size_t>(width) * static_cast<size_t>(height);
 }
 
-// Empty, or what is wrong with the pixels of one image of a job.
+// The pixels of one image of a job.
 template <class Pixel>
-std::string CheckPart(const char* name, const CameraCalibration& calibration, const Rect& rect,
-                      const Image<Pixel>& image, const Rect& needed) {
-  if (!LiesWithin(rect, calibration)) return std::string("the ") + name + " rectangle leaves the image";
+Result<> CheckPixels(const std::string& name, const CameraCalibration& calibration, const Rect& rect,
+                     const Image<Pixel>& image, const Rect& needed) {
+  if (!LiesWithin(rect, calibration)) return Failed("the " + name + " rectangle leaves the image");
   if (!HasSize(image, rect.width, rect.height)) {
-    return std::string("the ") + name + " pixels are not as many as the rectangle's";
+    return Failed("the " + name + " pixels are not as many as the rectangle's");
   }
-  if (!Contains(rect, needed)) return std::string("the ") + name + " pixels lack the margin that the tile needs";
-  return "";
+  if (!Contains(rect, needed)) return Failed("the " + name + " pixels lack the margin that the tile needs");
+  return {};
 }
 
-std::string CheckNumbers(const TileJob& job) {
-  if (!job.frame.valid()) return "the frame number is negative";
+Result<> CheckNumbers(const TileJob& job) {
+  if (!job.frame.valid()) return Failed("the frame number is negative");
   if (job.num_tiles < 1 || job.tile < 0 || job.tile >= job.num_tiles) {
-    return "there are " + std::to_string(job.num_tiles) + " tiles";
+    return Failed("there are " + std::to_string(job.num_tiles) + " tiles");
   }
-  if (const std::string error = job.calibration.Check(); !error.empty()) return error;
-  if (const std::string error = job.options.Check(); !error.empty()) return error;
+  TESSERA_RETURN_IF_FAILED(job.calibration.Check());
+  TESSERA_RETURN_IF_FAILED(job.options.Check());
   if (job.first_level < 0 || job.last_level < job.first_level || job.last_level >= job.options.num_levels) {
-    return "levels " + std::to_string(job.first_level) + " to " + std::to_string(job.last_level) +
-           " are not a range of the pyramid's " + std::to_string(job.options.num_levels);
+    return Failed("levels " + std::to_string(job.first_level) + " to " + std::to_string(job.last_level) +
+                  " are not a range of the pyramid's " + std::to_string(job.options.num_levels));
   }
-  if (!LiesWithin(job.core, job.calibration)) return "the core leaves the image";
-  return "";
+  if (!LiesWithin(job.core, job.calibration)) return Failed("the core leaves the image");
+  return {};
+}
+
+Result<> CheckImages(const TileJob& job) {
+  const TilePlan plan = PlanTile(job.calibration, job.options, job.core, job.first_level, job.last_level);
+  TESSERA_RETURN_IF_FAILED(CheckPixels("left", job.calibration, job.left_rect, job.left, plan.levels[0].left));
+  if (job.calibration.sensor == SensorType::kStereo) {
+    return CheckPixels("right", job.calibration, job.right_rect, job.right, plan.levels[0].right);
+  }
+  if (job.calibration.sensor == SensorType::kRgbd) {
+    return CheckPixels("depth", job.calibration, job.depth_rect, job.depth, plan.depth);
+  }
+  return {};
 }
 
 // Rectangles and pixels of the job, for the core that it has.
@@ -71,8 +83,8 @@ void TakePixels(const CameraFrame& frame, TileJob& job, const TilePlan& plan) {
 
 void CheckFrame(const CameraFrame& frame, const CameraCalibration& calibration, const FeatureOptions& options) {
   const std::string where = "frame " + std::to_string(frame.id.value) + ": ";
-  if (const std::string error = calibration.Check(); !error.empty()) throw InputError(where + error);
-  if (const std::string error = options.Check(); !error.empty()) throw InputError(where + error);
+  ThrowIfFailed<InputError>(calibration.Check(), where);
+  ThrowIfFailed<InputError>(options.Check(), where);
   const auto fits = [&calibration](const auto& image) {
     return HasSize(image, calibration.width_px, calibration.height_px);
   };
@@ -146,20 +158,12 @@ std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration&
   return jobs;
 }
 
-std::string CheckTileJob(const TileJob& job) {
-  std::string error = CheckNumbers(job);
-  if (error.empty()) {
-    const TilePlan plan = PlanTile(job.calibration, job.options, job.core, job.first_level, job.last_level);
-    error = CheckPart("left", job.calibration, job.left_rect, job.left, plan.levels[0].left);
-    if (error.empty() && job.calibration.sensor == SensorType::kStereo) {
-      error = CheckPart("right", job.calibration, job.right_rect, job.right, plan.levels[0].right);
-    }
-    if (error.empty() && job.calibration.sensor == SensorType::kRgbd) {
-      error = CheckPart("depth", job.calibration, job.depth_rect, job.depth, plan.depth);
-    }
-  }
-  if (error.empty()) return "";
-  return "tile " + std::to_string(job.tile) + " of frame " + std::to_string(job.frame.value) + ": " + error;
+Result<> CheckTileJob(const TileJob& job) {
+  Result<> checked = CheckNumbers(job);
+  if (checked) checked = CheckImages(job);
+  if (checked) return {};
+  return Failed("tile " + std::to_string(job.tile) + " of frame " + std::to_string(job.frame.value) + ": " +
+                checked.error().sentence);
 }
 
 }  // namespace tessera

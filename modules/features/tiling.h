@@ -33,8 +33,7 @@ TileGrid ParseTileGrid(const std::string& text);
 std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t arrival_us,
                               TileGrid grid, int coarse_levels_from, const FeatureOptions& options);
 
-// Empty if an extractor can work on the job: ranges and sizes are right, and the pixels that the core needs are there.
-// Else one sentence.
-std::string CheckTileJob(const TileJob& job);
+// Whether an extractor can work on the job: ranges and sizes are right, and the pixels that the core needs are there.
+Result<> CheckTileJob(const TileJob& job);
 
 }  // namespace tessera

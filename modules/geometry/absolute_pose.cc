@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
-#include <random>
 
 #include "geometry/reprojection.h"
 #include "geometry/sampling.h"
@@ -119,11 +118,9 @@ std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibr
   if (points.size() < static_cast<size_t>(std::max(3, options.min_inliers))) {
     return std::nullopt;
   }
-  std::mt19937_64 generator(seed);
   AbsolutePose best;
   std::vector<char> is_inlier(points.size());
-  for (int iteration = 0; iteration < options.ransac_iterations; ++iteration) {
-    const auto sample = SampleDistinct<3>(generator, points.size());
+  ForEachSample<3>(seed, points.size(), options.ransac_iterations, [&](const std::array<size_t, 3>& sample) {
     std::array<Eigen::Vector3d, 3> in_world, rays;
     for (size_t k = 0; k < 3; ++k) {
       in_world[k] = points[sample[k]].point_in_world;
@@ -135,7 +132,7 @@ std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibr
         best = {pose, is_inlier, num_inliers};
       }
     }
-  }
+  });
   return best.num_inliers >= options.min_inliers ? std::optional(best) : std::nullopt;
 }
 

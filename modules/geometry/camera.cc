@@ -16,25 +16,25 @@ std::string ToString(SensorType sensor) {
   return "unknown";
 }
 
-std::string CameraCalibration::Check() const {
+Result<> CameraCalibration::Check() const {
   const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
   if (width_px <= 0 || height_px <= 0 || width_px > 16384 || height_px > 16384) {
-    return "the image size " + std::to_string(width_px) + "x" + std::to_string(height_px) +
-           " px is not between 1 and 16384";
+    return Failed("the image size " + std::to_string(width_px) + "x" + std::to_string(height_px) +
+                  " px is not between 1 and 16384");
   }
   if (!positive(fx_px) || !positive(fy_px) || !std::isfinite(cx_px) || !std::isfinite(cy_px)) {
-    return "focal lengths must be positive and the principal point finite";
+    return Failed("focal lengths must be positive and the principal point finite");
   }
   if (sensor != SensorType::kMono && sensor != SensorType::kStereo && sensor != SensorType::kRgbd) {
-    return "the sensor type " + std::to_string(static_cast<int>(sensor)) + " does not exist";
+    return Failed("the sensor type " + std::to_string(static_cast<int>(sensor)) + " does not exist");
   }
   if (sensor == SensorType::kStereo && !positive(baseline_m)) {
-    return "a stereo camera needs a positive baseline";
+    return Failed("a stereo camera needs a positive baseline");
   }
   if (sensor == SensorType::kRgbd && !positive(depth_unit_m)) {
-    return "an RGB-D camera needs a positive depth unit";
+    return Failed("an RGB-D camera needs a positive depth unit");
   }
-  return "";
+  return {};
 }
 
 }  // namespace tessera

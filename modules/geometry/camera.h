@@ -10,6 +10,8 @@
 #include <Eigen/Core>
 #include <string>
 
+#include "core/result.h"
+
 namespace tessera {
 
 enum class SensorType { kMono = 0, kStereo = 1, kRgbd = 2 };
@@ -30,8 +32,7 @@ struct CameraCalibration {
 
   bool operator==(const CameraCalibration&) const = default;
 
-  // Empty if all is well, else one sentence that says what is out of range.
-  std::string Check() const;
+  Result<> Check() const;
 
   // Pixel of a point in the camera frame; its z must be > 0.
   Eigen::Vector2d Project(const Eigen::Vector3d& point_in_camera) const {

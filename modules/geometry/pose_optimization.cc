@@ -1,13 +1,11 @@
 #include "geometry/pose_optimization.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <cmath>
 
 namespace tessera {
 namespace {
 
-constexpr double kMinDepth = 1e-6;
 constexpr int kMinInliers = 3;  // points that fix six degrees of freedom
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -24,11 +22,8 @@ class PoseProblem {
       : calibration_(calibration),
         baseline_m_(baseline_m),
         observations_(observations),
-        weights_(observations.size(), Eigen::Matrix3d::Identity()),
         is_inlier_(observations.size(), 1) {}
 
-  // W_i = (I + J_i C_i J_i')^-1 at this pose.
-  void ComputeWeights(const Rigid3& camera_from_world);
   // Sorts into inliers and outliers; returns how many inliers.
   int Classify(const Rigid3& camera_from_world);
   NormalEquations Linearize(const Rigid3& camera_from_world, bool robust) const;
@@ -40,26 +35,9 @@ class PoseProblem {
   const CameraCalibration& calibration_;
   double baseline_m_;
   std::span<const PoseObservation> observations_;
-  std::vector<Eigen::Matrix3d> weights_;
   std::vector<char> is_inlier_;
   double rms_ = 0.0;
 };
-
-void PoseProblem::ComputeWeights(const Rigid3& camera_from_world) {
-  const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
-  for (size_t i = 0; i < observations_.size(); ++i) {
-    const PoseObservation& observation = observations_[i];
-    const Eigen::Vector3d point = rotation * observation.point_in_world + camera_from_world.translation;
-    if (point.z() < kMinDepth || observation.covariance.isZero(0.0)) {
-      weights_[i].setIdentity();
-      continue;
-    }
-    const Eigen::Matrix3d by_world = Reproject(calibration_, baseline_m_, point, observation.seen).by_point * rotation;
-    const Eigen::Matrix3d spread =
-        Eigen::Matrix3d::Identity() + by_world * observation.covariance * by_world.transpose();
-    weights_[i] = spread.inverse();
-  }
-}
 
 int PoseProblem::Classify(const Rigid3& camera_from_world) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
@@ -73,7 +51,7 @@ int PoseProblem::Classify(const Rigid3& camera_from_world) {
       continue;
     }
     const Eigen::Vector3d residual = ReprojectionResidual(calibration_, baseline_m_, point, seen);
-    const double chi2 = residual.dot(weights_[i] * residual);
+    const double chi2 = residual.dot(residual);
     if (chi2 <= Chi2Limit(seen.has_right())) {
       is_inlier_[i] = 1;
       ++num_inliers;
@@ -96,9 +74,9 @@ NormalEquations PoseProblem::Linearize(const Rigid3& camera_from_world, bool rob
     // d(point)/d(delta) = [I, -[point]x] for Retract's left perturbation.
     Eigen::Matrix<double, 3, 6> by_pose;
     by_pose << r.by_point, -r.by_point * Skew(point);
-    const double chi2 = r.residual.dot(weights_[i] * r.residual);
+    const double chi2 = r.residual.dot(r.residual);
     const double loss = robust ? HuberWeight(chi2, Chi2Limit(observations_[i].seen.has_right())) : 1.0;
-    const Eigen::Matrix<double, 6, 3> weighted = by_pose.transpose() * (loss * weights_[i]);
+    const Eigen::Matrix<double, 6, 3> weighted = loss * by_pose.transpose();
     equations.information.noalias() += weighted * by_pose;
     equations.gradient.noalias() += weighted * r.residual;
   }
@@ -114,7 +92,6 @@ PoseOptimizationResult OptimizePose(const CameraCalibration& calibration, double
   PoseOptimizationResult result;
   result.camera_from_world = camera_from_world;
   for (int round = 0; round < options.num_rounds; ++round) {
-    problem.ComputeWeights(result.camera_from_world);
     for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
       const NormalEquations equations = problem.Linearize(result.camera_from_world, true);
       result.information = equations.information;

@@ -14,7 +14,6 @@ namespace tessera {
 // A known point and where the camera sees it.
 struct PoseObservation {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of point_in_world, m^2; zero: exactly known
   PixelObservation seen;
 };
 
@@ -34,12 +33,11 @@ struct PoseOptimizationResult {
 
 // Minimises over camera_from_world, by Gauss-Newton with Huber weights,
 //
-//   sum_i rho(r_i' W_i r_i),   r_i = project(camera_from_world * point_i) - pixel_i,
-//   W_i = (I + J_i C_i J_i')^-1,  J_i = dr_i/d(point_i),  C_i the covariance of point_i
+//   sum_i rho(|r_i|^2),   r_i = (project(camera_from_world * point_i) - pixel_i) / sigma_i
 //
-// so that a point whose depth is poorly known still fixes the rotation, but hardly the translation. Observations that
-// stand behind the camera, or that fail the chi-square test after a round, take no part in the next; they may return.
-// `baseline_m` as in Reprojection. With fewer than 3 inliers the pose is returned as it was and num_inliers is 0.
+// The points are taken as exact. Observations that stand behind the camera, or that fail the chi-square test after a
+// round, take no part in the next; they may return. `baseline_m` as in Reprojection. With fewer than 3 inliers the pose
+// is returned as it was and num_inliers is 0.
 PoseOptimizationResult OptimizePose(const CameraCalibration& calibration, double baseline_m,
                                     std::span<const PoseObservation> observations, const Rigid3& camera_from_world,
                                     const PoseOptimizationOptions& options);

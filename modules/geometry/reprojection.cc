@@ -1,7 +1,5 @@
 #include "geometry/reprojection.h"
 
-#include <cmath>
-
 namespace tessera {
 
 Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, double baseline_m,
@@ -31,10 +29,6 @@ Reprojection Reproject(const CameraCalibration& calibration, double baseline_m, 
     result.by_point.row(2) << fx, 0.0, -fx * (x - baseline_m * inverse_z);
   }
   return result;
-}
-
-double HuberWeight(double squared, double corner_squared) {
-  return squared <= corner_squared ? 1.0 : std::sqrt(corner_squared / squared);
 }
 
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {

@@ -9,6 +9,9 @@
 
 namespace tessera {
 
+// Points with a smaller z (meters, or units of the map) count as behind the camera.
+inline constexpr double kMinDepth = 1e-6;
+
 inline constexpr double kNoColumn = std::numeric_limits<double>::quiet_NaN();
 
 // Where an image shows a point. A depth z is carried as the column that a right camera `baseline_m` away would see,
@@ -40,9 +43,17 @@ Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, doubl
 // 95 % of observations without a gross error have a squared residual below this (chi-square, 2 or 3 degrees of
 // freedom).
 inline double Chi2Limit(bool has_right) { return has_right ? 7.815 : 5.991; }
+// The same for one degree of freedom: a distance from a line, or a depth.
+inline constexpr double kChi2LimitOfOne = 3.841;
 
-// Weight of a squared residual under Huber's loss with corner `corner_squared`: 1 below it, then falling like 1/|r|.
-double HuberWeight(double squared, double corner_squared);
+// Huber's loss of a squared residual, with its corner at `corner_squared`, in the same units.
+inline double HuberLoss(double squared, double corner_squared) {
+  return squared <= corner_squared ? squared : 2.0 * std::sqrt(squared * corner_squared) - corner_squared;
+}
+// Its derivative, the weight of the squared residual: 1 below the corner, then falling like 1/|r|.
+inline double HuberWeight(double squared, double corner_squared) {
+  return squared <= corner_squared ? 1.0 : std::sqrt(corner_squared / squared);
+}
 
 // [v]x, so that Skew(v) * w = v x w.
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <random>
 
 namespace tessera {
@@ -20,6 +21,14 @@ std::array<size_t, kCount> SampleDistinct(std::mt19937_64& generator, size_t pop
     k += is_new ? 1 : 0;
   }
   return sample;
+}
+
+// The loop of RANSAC: calls visit(indices) for `num_samples` samples of kCount different indices out of
+// 0 .. population - 1. `seed` decides them.
+template <int kCount, class Visit>
+void ForEachSample(uint64_t seed, size_t population, int num_samples, Visit visit) {
+  std::mt19937_64 generator(seed);
+  for (int i = 0; i < num_samples; ++i) visit(SampleDistinct<kCount>(generator, population));
 }
 
 }  // namespace tessera

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "geometry/camera.h"
 #include "geometry/reprojection.h"
 #include "geometry/rigid3.h"
@@ -40,8 +41,7 @@ struct SimilarityOptions {
   // Points on a line, or all at one place, leave a turn open: no estimate where the rotation is known worse than this.
   double max_rotation_sigma_rad = 0.03;
 
-  // Empty if all is well, else one sentence that says what is out of range.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 struct SimilarityEstimate {

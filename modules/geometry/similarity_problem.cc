@@ -13,16 +13,10 @@ using Matrix7d = Eigen::Matrix<double, 7, 7>;
 using Vector7d = Eigen::Matrix<double, 7, 1>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMinDepth = 1e-6;
-constexpr double kDepthCorner2 = 3.841;    // chi-square of 95 %, 1 degree of freedom
 constexpr double kMaxDepthResidual = 3.0;  // sigmas; the depths of far points have long tails
 constexpr double kFirstDamping = 1e-6;     // of the diagonal; nearly Gauss-Newton from a fair start
 constexpr double kMaxDamping = 1e6;
 constexpr double kEnoughGain = 1e-8;  // a step that lowers the cost by a smaller part of it ends the round
-
-double HuberCost(double squared, double corner_squared) {
-  return squared <= corner_squared ? squared : 2.0 * std::sqrt(squared * corner_squared) - corner_squared;
-}
 
 // r' W r and W J with W = (I + a a')^-1 = I - a a' / (1 + a'a), where a is what a standard deviation of depth moves.
 double WhitenedSquare(const Eigen::Vector3d& residual, const Eigen::Vector3d& spread) {
@@ -99,7 +93,7 @@ double SimilarityProblem::Cost(const Eigen::Vector3d& point_in_viewer, size_t i,
   if (!(point_in_viewer.z() >= kMinDepth)) return kInfinity;
   const Eigen::Vector3d residual =
       ReprojectionResidual(calibration_, options_.baseline_m, point_in_viewer, sights.seen[i]);
-  return 0.5 * HuberCost(WhitenedSquare(residual, sights.spreads[i]), Chi2Limit(sights.seen[i].has_right()));
+  return 0.5 * HuberLoss(WhitenedSquare(residual, sights.spreads[i]), Chi2Limit(sights.seen[i].has_right()));
 }
 
 double SimilarityProblem::Cost(const SimilarityEstimate& estimate) const {
@@ -111,7 +105,7 @@ double SimilarityProblem::Cost(const SimilarityEstimate& estimate) const {
     cost += Cost(point, i, in_first_) + Cost(second_from_first * in_second_.points[i], i, in_second_);
     if (UsesDepths() && std::isfinite(cost)) {
       const double depth = DepthResidual(point.z(), in_second_.points[i].z());
-      cost += 0.5 * HuberCost(depth * depth, kDepthCorner2);
+      cost += 0.5 * HuberLoss(depth * depth, kChi2LimitOfOne);
     }
   }
   return cost;
@@ -140,7 +134,7 @@ SimilarityProblem::Linear SimilarityProblem::Linearize(const SimilarityEstimate&
       Eigen::Matrix<double, 3, 7> by_tangent = Eigen::Matrix<double, 3, 7>::Zero();
       by_tangent.row(0) = per_depth / in_first.z() * move.row(2);
       const Eigen::Vector3d depth(DepthResidual(in_first.z(), back.z()), 0.0, 0.0);
-      linear.Add(depth, by_tangent, Eigen::Vector3d::Zero(), kDepthCorner2);
+      linear.Add(depth, by_tangent, Eigen::Vector3d::Zero(), kChi2LimitOfOne);
     }
   }
   if (!options_.has_scale) {

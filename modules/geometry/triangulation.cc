@@ -7,8 +7,6 @@
 namespace tessera {
 namespace {
 
-constexpr double kMinDepth = 1e-6;
-
 struct PointEquations {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -16,11 +14,6 @@ struct PointEquations {
   double max_chi2 = 0.0;
   int worst_view = -1;
 };
-
-// Huber's loss for a squared residual, in the same units.
-double HuberLoss(double squared, double corner_squared) {
-  return squared <= corner_squared ? squared : 2.0 * std::sqrt(squared * corner_squared) - corner_squared;
-}
 
 // nullopt if a camera has the point behind it.
 std::optional<PointEquations> Linearize(const CameraCalibration& calibration, double baseline_m,

@@ -1,9 +1,9 @@
 #include "geometry/two_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "geometry/epipolar.h"
 #include "geometry/reprojection.h"
@@ -14,7 +14,7 @@ namespace tessera {
 namespace {
 
 // What is the same for all candidate motions.
-struct Problem {
+struct TwoViewProblem {
   std::vector<RayPair> rays;
   double limit_squared = 0.0;  // largest squared error of an inlier, one degree of freedom, in ray units
   double corner = 0.0;         // its root
@@ -28,11 +28,11 @@ struct Candidate {
   double cost = 0.0;  // see Cost()
 };
 
-Problem MakeProblem(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
-                    const TwoViewOptions& options) {
-  Problem problem;
+TwoViewProblem MakeProblem(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
+                           const TwoViewOptions& options) {
+  TwoViewProblem problem;
   problem.options = options;
-  problem.corner = std::sqrt(3.841) * options.sigma_px / calibration.fx_px;  // 95 % of chi-square, 1 degree
+  problem.corner = std::sqrt(kChi2LimitOfOne) * options.sigma_px / calibration.fx_px;  // 95 % of chi-square, 1 degree
   problem.limit_squared = problem.corner * problem.corner;
   problem.rays.reserve(pairs.size());
   for (const PixelPair& pair : pairs) {
@@ -43,18 +43,16 @@ Problem MakeProblem(const CameraCalibration& calibration, std::span<const PixelP
 
 // RANSAC with a truncated quadratic cost: `fit` makes a model of a sample, `error_squared` judges one pair.
 template <int kSampleSize, class Fit, class Error>
-std::optional<Eigen::Matrix3d> SampleModel(const Problem& problem, uint64_t seed, double limit_squared, Fit fit,
+std::optional<Eigen::Matrix3d> SampleModel(const TwoViewProblem& problem, uint64_t seed, double limit_squared, Fit fit,
                                            Error error_squared) {
-  std::mt19937_64 generator(seed);
   std::optional<Eigen::Matrix3d> best;
   double best_cost = std::numeric_limits<double>::infinity();
   std::array<RayPair, kSampleSize> sample;
-  for (int iteration = 0; iteration < problem.options.ransac_iterations; ++iteration) {
-    const auto indices = SampleDistinct<kSampleSize>(generator, problem.rays.size());
+  const auto try_sample = [&](const std::array<size_t, kSampleSize>& indices) {
     std::transform(indices.begin(), indices.end(), sample.begin(), [&](size_t i) { return problem.rays[i]; });
     const std::optional<Eigen::Matrix3d> model = fit(sample);
     if (!model) {
-      continue;
+      return;
     }
     double cost = 0.0;
     for (const RayPair& pair : problem.rays) {
@@ -67,12 +65,13 @@ std::optional<Eigen::Matrix3d> SampleModel(const Problem& problem, uint64_t seed
       best_cost = cost;
       best = model;
     }
-  }
+  };
+  ForEachSample<kSampleSize>(seed, problem.rays.size(), problem.options.ransac_iterations, try_sample);
   return best;
 }
 
 // The point of a pair, if it lies in front of both cameras, projects near both pixels, and has enough parallax.
-std::optional<Eigen::Vector3d> GoodPoint(const Problem& problem, const Rigid3& motion, const RayPair& pair) {
+std::optional<Eigen::Vector3d> GoodPoint(const TwoViewProblem& problem, const Rigid3& motion, const RayPair& pair) {
   const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
   if (!point || point->z() <= 0.0) {
     return std::nullopt;
@@ -83,7 +82,7 @@ std::optional<Eigen::Vector3d> GoodPoint(const Problem& problem, const Rigid3& m
   }
   const double error_first = (point->head<2>() / point->z() - pair.first.head<2>()).squaredNorm();
   const double error_second = (in_second.head<2>() / in_second.z() - pair.second.head<2>()).squaredNorm();
-  const double limit = problem.limit_squared * 5.991 / 3.841;  // two degrees of freedom
+  const double limit = problem.limit_squared * Chi2Limit(false) / kChi2LimitOfOne;  // two degrees of freedom
   const double cosine = CosParallax(*point, Eigen::Vector3d::Zero(), motion.Inverse().translation);
   if (error_first > limit || error_second > limit || cosine > std::cos(problem.options.min_parallax_rad)) {
     return std::nullopt;
@@ -92,7 +91,7 @@ std::optional<Eigen::Vector3d> GoodPoint(const Problem& problem, const Rigid3& m
 }
 
 // Refines the motion on the pairs that agree with it, twice, since a better motion finds more of them.
-RefinedMotion RefineOnInliers(const Problem& problem, const Rigid3& motion) {
+RefinedMotion RefineOnInliers(const TwoViewProblem& problem, const Rigid3& motion) {
   RefinedMotion refined{motion};
   for (int round = 0; round < 2; ++round) {
     const Eigen::Matrix3d essential = EssentialFromMotion(refined.second_from_first);
@@ -111,7 +110,7 @@ RefinedMotion RefineOnInliers(const Problem& problem, const Rigid3& motion) {
 // Truncated squared errors of all pairs, in units of the limit: how ill the motion explains them. A pair whose point
 // stands behind a camera is not explained. Points that are too far for parallax count like others: the motion that puts
 // most points near is not therefore the true one.
-double Cost(const Problem& problem, const Rigid3& motion) {
+double Cost(const TwoViewProblem& problem, const Rigid3& motion) {
   const Eigen::Matrix3d essential = EssentialFromMotion(motion);
   double cost = 0.0;
   for (const RayPair& pair : problem.rays) {
@@ -127,7 +126,7 @@ double Cost(const Problem& problem, const Rigid3& motion) {
   return cost;
 }
 
-Candidate Evaluate(const Problem& problem, const RefinedMotion& motion) {
+Candidate Evaluate(const TwoViewProblem& problem, const RefinedMotion& motion) {
   Candidate candidate{motion, {}, 0, Cost(problem, motion.second_from_first)};
   candidate.points.reserve(problem.rays.size());
   for (const RayPair& pair : problem.rays) {
@@ -137,7 +136,7 @@ Candidate Evaluate(const Problem& problem, const RefinedMotion& motion) {
   return candidate;
 }
 
-std::vector<Rigid3> PossibleMotions(const Problem& problem, uint64_t seed) {
+std::vector<Rigid3> PossibleMotions(const TwoViewProblem& problem, uint64_t seed) {
   std::vector<Rigid3> motions;
   const auto essential = SampleModel<8>(problem, seed, problem.limit_squared, EssentialFromPairs,
                                         [](const Eigen::Matrix3d& e, const RayPair& pair) {
@@ -147,8 +146,8 @@ std::vector<Rigid3> PossibleMotions(const Problem& problem, uint64_t seed) {
   if (essential) {
     motions = MotionsFromEssential(*essential);
   }
-  const auto homography = SampleModel<4>(problem, seed + 1, problem.limit_squared * 5.991 / 3.841, HomographyFromPairs,
-                                         TransferErrorSquared);
+  const auto homography = SampleModel<4>(problem, seed + 1, problem.limit_squared * Chi2Limit(false) / kChi2LimitOfOne,
+                                         HomographyFromPairs, TransferErrorSquared);
   if (homography) {
     const std::vector<Rigid3> more = MotionsFromHomography(*homography);
     motions.insert(motions.end(), more.begin(), more.end());
@@ -162,7 +161,7 @@ bool AreDifferent(const Rigid3& a, const Rigid3& b) {
 }
 
 // Whether a motion other than the best explains nearly as much.
-bool HasRival(const Problem& problem, const std::vector<Candidate>& candidates, const Candidate& best) {
+bool HasRival(const TwoViewProblem& problem, const std::vector<Candidate>& candidates, const Candidate& best) {
   const auto explained = [&](const Candidate& c) { return static_cast<double>(problem.rays.size()) - c.cost; };
   return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& other) {
     return explained(other) > problem.options.max_rival_share * explained(best) &&
@@ -172,12 +171,12 @@ bool HasRival(const Problem& problem, const std::vector<Candidate>& candidates, 
 
 }  // namespace
 
-std::string TwoViewOptions::Check() const {
+Result<> TwoViewOptions::Check() const {
   if (!(sigma_px > 0.0) || ransac_iterations < 1 || min_points < 8 || !(min_parallax_rad > 0.0) ||
       !(max_rival_share > 0.0) || !(max_direction_sigma_rad > 0.0)) {
-    return "two-view options must be positive, and min_points at least 8";
+    return Failed("two-view options must be positive, and min_points at least 8");
   }
-  return "";
+  return {};
 }
 
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
@@ -185,7 +184,7 @@ std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibratio
   if (pairs.size() < static_cast<size_t>(options.min_points)) {
     return std::nullopt;
   }
-  const Problem problem = MakeProblem(calibration, pairs, options);
+  const TwoViewProblem problem = MakeProblem(calibration, pairs, options);
   std::vector<Candidate> candidates;
   for (const Rigid3& motion : PossibleMotions(problem, seed)) {
     candidates.push_back(Evaluate(problem, RefineOnInliers(problem, motion)));

@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "geometry/camera.h"
+#include "geometry/keypoint_noise.h"
 #include "geometry/rigid3.h"
 
 namespace tessera {
@@ -19,16 +21,15 @@ struct PixelPair {
 };
 
 struct TwoViewOptions {
-  double sigma_px = 1.0;            // standard deviation of a keypoint coordinate
-  int ransac_iterations = 300;      // samples for each model: 8 good of 8 are met with 99 % at 60 % good matches
-  int min_points = 60;              // points with good parallax and small error that a start needs
+  double sigma_px = kMixedLevelSigmaPx;  // standard deviation of a keypoint coordinate
+  int ransac_iterations = 300;           // samples for each model: 8 good of 8 are met with 99 % at 60 % good matches
+  int min_points = 60;                   // points with good parallax and small error that a start needs
   double min_parallax_rad = 0.017;  // 1 degree: a point's depth is then good to about sigma_px / (f * 0.017) ~ 10 %
   double max_rival_share = 0.75;    // a different motion that explains more than this share of what the best explains
                                     // makes the case ambiguous
   double max_direction_sigma_rad = 0.03;  // of the translation: worse, and turning can't be told from moving aside
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 struct TwoViewResult {

@@ -20,15 +20,15 @@ LoopCloser::LoopCloser(std::shared_ptr<const Vocabulary> vocabulary, const LoopC
   if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
 }
 
-std::string LoopCloser::ApplyDelta(const MapDelta& delta) {
+Result<> LoopCloser::ApplyDelta(const MapDelta& delta) {
   if (delta.is_snapshot) places_ = PlaceDatabase();
-  if (std::string problem = map_.Apply(delta); !problem.empty()) return problem;
+  TESSERA_RETURN_IF_FAILED(map_.Apply(delta));
   for (const KeyframeId id : delta.removed_keyframes) places_.Remove(id);
   for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
     if (map_.FindKeyframe(added.id) == nullptr) continue;
     places_.Add(added.id, std::make_shared<const BagOfWords>(vocabulary_->Describe(added.features->descriptors)));
   }
-  return "";
+  return {};
 }
 
 LoopResult LoopCloser::FindLoop(KeyframeId id) const {

@@ -34,8 +34,8 @@ class LoopCloser {
   // Throws std::invalid_argument with Check()'s sentence.
   LoopCloser(std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
 
-  // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
-  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
+  // Applies the mapper's next change to the replica; fails as Map::Apply does.
+  Result<> ApplyDelta(const MapDelta& delta);
 
   // Whether keyframe `id` shows an earlier place, in the present map. "No loop" if it is no longer there.
   LoopResult FindLoop(KeyframeId id) const;

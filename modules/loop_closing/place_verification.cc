@@ -10,8 +10,6 @@
 namespace tessera {
 namespace {
 
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
-
 // A keypoint of the matched keyframe (first) and one of the current (second), whose landmarks should be the same point.
 PointPair MakePair(const Map& map, const Keyframe& matched, const Keyframe& current, const KeypointPair& pair) {
   const auto seen = [&](const Keyframe& keyframe, int32_t keypoint, Eigen::Vector3d* point, PixelObservation* pixel) {
@@ -69,8 +67,8 @@ std::string VerificationOptions::Check() const {
     return "verification needs at least 3 matches and 6 observed landmarks";
   }
   if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage must be between 0 and 1";
-  for (const std::string& sentence : {similarity.Check(), guided.Check()}) {
-    if (!sentence.empty()) return sentence;
+  for (const Result<>& checked : {similarity.Check(), guided.Check()}) {
+    if (!checked) return checked.error().sentence;
   }
   return "";
 }
@@ -135,7 +133,7 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
   steps->is_aligned = aligned.has_value();
   if (!aligned) return std::nullopt;
 
-  TrackedFrame frame(std::make_shared<const FrameView>(*current.features, options.sigma_px, kRgbdBaseline));
+  TrackedFrame frame(std::make_shared<const FrameView>(*current.features));
   const PlacedPoints landmarks = LandmarksAround(map, candidate, options.num_neighbors);
   frame.world_from_camera = (Sim3::From(matched.world_from_camera) * aligned->first_from_second).Pose();
   if (LocalizeAmong(landmarks, options.guided, {}, frame) < options.min_seen) return std::nullopt;

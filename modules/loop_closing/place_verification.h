@@ -25,7 +25,6 @@ struct VerificationOptions {
   MatchOptions guided{.local_radius_px = 6.0, .max_hamming = 64};
   int min_seen = 45;          // landmarks of the place that the keyframe must observe
   double min_coverage = 0.4;  // see Coverage(): true places have 0.75 and more, the same car elsewhere up to 0.25
-  double sigma_px = kKeypointSigmaPx;
 
   // Empty if all is well, else one sentence.
   std::string Check() const;

@@ -9,8 +9,6 @@
 namespace tessera {
 namespace {
 
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
-
 // The pose of the camera in the world from the landmarks of one keyframe.
 std::optional<Rigid3> RoughPose(const Keyframe& keyframe, const BagOfWords& keyframe_bag, const Map& map,
                                 const FrameView& view, const BagOfWords& bag, const RelocalizationOptions& options) {
@@ -38,7 +36,8 @@ std::string RelocalizationOptions::Check() const {
     return "relocalization needs at least 4 matches and 6 observed landmarks";
   }
   if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage must be between 0 and 1";
-  return guided.Check();
+  const Result<> checked = guided.Check();
+  return checked ? "" : checked.error().sentence;
 }
 
 RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, const Vocabulary& vocabulary,
@@ -46,7 +45,7 @@ RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, con
                                 const RelocalizationOptions& options) {
   RelocalizationAnswer answer;
   answer.frame = request.features.frame;
-  const auto view = std::make_shared<const FrameView>(request.features, options.sigma_px, kRgbdBaseline);
+  const auto view = std::make_shared<const FrameView>(request.features);
   const BagOfWords bag = vocabulary.Describe(view->features().descriptors);
   const std::vector<KeyframeId> found = FindPlaces(map, places, bag, candidates);
   answer.num_candidates = static_cast<int32_t>(found.size());

@@ -22,7 +22,6 @@ struct RelocalizationOptions {
   MatchOptions guided{.local_radius_px = 8.0};
   int min_seen = 50;          // landmarks of the place that the image must show
   double min_coverage = 0.4;  // see Coverage()
-  double sigma_px = kKeypointSigmaPx;
 
   // Empty if all is well, else one sentence.
   std::string Check() const;

@@ -9,8 +9,6 @@
 namespace tessera {
 namespace {
 
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
-
 Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in_world,
                               const std::vector<Observation>& observations) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -49,7 +47,6 @@ Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   const Keyframe& newest = *map.FindKeyframe(observations.back().keyframe);
   const Keypoint& keypoint = newest.features->keypoints[Index(observations.back().keypoint)];
   const double distance = (newest.world_from_camera.translation - landmark.position_in_world).norm();
-  constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;
   landmark.max_distance = distance * LevelScale(keypoint.level);
   landmark.min_distance = landmark.max_distance / LevelScale(kTopLevel);
   return landmark;

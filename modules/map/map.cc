@@ -99,30 +99,32 @@ std::string Name(LandmarkId id) { return "landmark " + std::to_string(id.value);
 
 }  // namespace
 
-std::string Map::Apply(const MapDelta& delta) {
+Result<> Map::Apply(const MapDelta& delta) {
   if (delta.is_snapshot) {
     *this = Map();
     next_delta_ = delta.number;
   }
   if (delta.number != next_delta_) {
-    return "delta " + std::to_string(delta.number) + " came where " + std::to_string(next_delta_) + " was expected";
+    return Failed("delta " + std::to_string(delta.number) + " came where " + std::to_string(next_delta_) +
+                  " was expected");
   }
-  if (std::string problem = ApplyLists(delta); !problem.empty()) {
-    return "delta " + std::to_string(delta.number) + ": " + problem;
+  if (const Result<> applied = ApplyLists(delta); !applied) {
+    return Failed("delta " + std::to_string(delta.number) + ": " + applied.error().sentence);
   }
   ++next_delta_;
   answered_ = delta.answers;
   if (hash_ != delta.hash) {
-    return "delta " + std::to_string(delta.number) + ": this replica of the map differs from the mapper's (wrong hash)";
+    return Failed("delta " + std::to_string(delta.number) +
+                  ": this replica of the map differs from the mapper's (wrong hash)");
   }
-  return "";
+  return {};
 }
 
-std::string Map::ApplyLists(const MapDelta& delta) {
+Result<> Map::ApplyLists(const MapDelta& delta) {
   for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
     if (!added.id.valid() || keyframes_.Has(added.id) || added.id.value > keyframes_.end_id() + kMaxIdLeap ||
         added.features == nullptr || added.features->descriptors.size() != added.features->keypoints.size()) {
-      return Name(added.id) + " can't be added";
+      return Failed(Name(added.id) + " can't be added");
     }
     const size_t num_keypoints = added.features->keypoints.size();
     const Keyframe& keyframe = keyframes_.Put(added.id, {added.features,
@@ -136,14 +138,14 @@ std::string Map::ApplyLists(const MapDelta& delta) {
   }
   for (const MapDelta::MovedKeyframe& moved : delta.moved_keyframes) {
     Keyframe* keyframe = keyframes_.Find(moved.id);
-    if (keyframe == nullptr) return Name(moved.id) + " is not there to be moved";
+    if (keyframe == nullptr) return Failed(Name(moved.id) + " is not there to be moved");
     hash_ -= HashOf(moved.id, *keyframe);
     keyframe->world_from_camera = moved.world_from_camera;
     keyframe->scale = moved.scale;
     hash_ += HashOf(moved.id, *keyframe);
   }
   for (const auto& [id, landmark] : delta.changed_landmarks) {
-    if (!id.valid() || id.value > landmarks_.end_id() + kMaxIdLeap) return Name(id) + " can't be added";
+    if (!id.valid() || id.value > landmarks_.end_id() + kMaxIdLeap) return Failed(Name(id) + " can't be added");
     if (Landmark* old = landmarks_.Find(id); old != nullptr) {
       hash_ -= HashOf(id, *old);
       *old = landmark;
@@ -154,20 +156,20 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     hash_ += HashOf(id, landmark);
   }
   for (const auto& change : delta.removed_observations) {
-    if (std::string problem = RemoveObservation(change); !problem.empty()) return problem;
+    TESSERA_RETURN_IF_FAILED(RemoveObservation(change));
   }
   for (const auto& change : delta.new_observations) {
-    if (std::string problem = AddObservation(change); !problem.empty()) return problem;
+    TESSERA_RETURN_IF_FAILED(AddObservation(change));
   }
   for (const auto& [id, parent] : delta.changed_parents) {
     Keyframe* keyframe = keyframes_.Find(id);
-    if (keyframe == nullptr) return Name(id) + " is not there to get another parent";
+    if (keyframe == nullptr) return Failed(Name(id) + " is not there to get another parent");
     hash_ -= HashOf(id, *keyframe);
     keyframe->parent = parent;
     hash_ += HashOf(id, *keyframe);
   }
   for (const LandmarkId id : delta.removed_landmarks) {
-    if (!landmarks_.Has(id) || !observations_.Find(id)->empty()) return Name(id) + " can't be removed";
+    if (!landmarks_.Has(id) || !observations_.Find(id)->empty()) return Failed(Name(id) + " can't be removed");
     hash_ -= HashOf(id, *landmarks_.Find(id));
     landmarks_.Remove(id);
     observations_.Remove(id);
@@ -176,7 +178,7 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     const Keyframe* keyframe = keyframes_.Find(id);
     if (keyframe == nullptr || std::any_of(keyframe->landmarks.begin(), keyframe->landmarks.end(),
                                            [](LandmarkId landmark) { return landmark.valid(); })) {
-      return Name(id) + " can't be removed";
+      return Failed(Name(id) + " can't be removed");
     }
     hash_ -= HashOf(id, *keyframe);
     keyframes_.Remove(id);
@@ -185,22 +187,22 @@ std::string Map::ApplyLists(const MapDelta& delta) {
     hash_ += HashOf(closed_loops_.size(), loop);
     closed_loops_.push_back(loop);
   }
-  return "";
+  return {};
 }
 
-std::string Map::AddObservation(const MapDelta::ChangedObservation& change) {
+Result<> Map::AddObservation(const MapDelta::ChangedObservation& change) {
   const auto& [landmark, observation] = change;
   Keyframe* keyframe = keyframes_.Find(observation.keyframe);
   std::vector<Observation>* observations = observations_.Find(landmark);
   if (keyframe == nullptr || observations == nullptr || observation.keypoint < 0 ||
       static_cast<size_t>(observation.keypoint) >= keyframe->landmarks.size() ||
       keyframe->landmarks[static_cast<size_t>(observation.keypoint)].valid()) {
-    return Name(observation.keyframe) + " can't observe " + Name(landmark);
+    return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark));
   }
   const auto place =
       std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
   if (place != observations->end() && place->keyframe == observation.keyframe) {
-    return Name(observation.keyframe) + " can't observe " + Name(landmark) + " twice";
+    return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark) + " twice");
   }
   for (const Observation& other : *observations) {
     CountShared(observation.keyframe, other.keyframe, 1);
@@ -208,22 +210,22 @@ std::string Map::AddObservation(const MapDelta::ChangedObservation& change) {
   observations->insert(place, observation);
   keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = landmark;
   hash_ += HashOf(change);
-  return "";
+  return {};
 }
 
-std::string Map::RemoveObservation(const MapDelta::ChangedObservation& change) {
+Result<> Map::RemoveObservation(const MapDelta::ChangedObservation& change) {
   const auto& [landmark, observation] = change;
   Keyframe* keyframe = keyframes_.Find(observation.keyframe);
   std::vector<Observation>* observations = observations_.Find(landmark);
   if (keyframe == nullptr || observations == nullptr || std::erase(*observations, observation) == 0) {
-    return Name(observation.keyframe) + " does not observe " + Name(landmark);
+    return Failed(Name(observation.keyframe) + " does not observe " + Name(landmark));
   }
   for (const Observation& other : *observations) {
     CountShared(observation.keyframe, other.keyframe, -1);
   }
   keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = LandmarkId{};
   hash_ -= HashOf(change);
-  return "";
+  return {};
 }
 
 void Map::CountShared(KeyframeId a, KeyframeId b, int change) {

@@ -14,6 +14,7 @@
 
 #include "core/id_map.h"
 #include "core/ids.h"
+#include "core/result.h"
 #include "features/feature_types.h"
 #include "geometry/rigid3.h"
 
@@ -109,8 +110,8 @@ struct MapDelta {
 
 class Map {
  public:
-  // Why a delta could not be applied; empty if it was. The map is unusable after a failure (ask for a snapshot).
-  [[nodiscard]] std::string Apply(const MapDelta& delta);
+  // Fails where the delta does not fit this map, which is unusable afterwards (ask for a snapshot).
+  Result<> Apply(const MapDelta& delta);
 
   // Number that the next delta must have.
   int64_t next_delta() const { return next_delta_; }
@@ -140,9 +141,9 @@ class Map {
  private:
   friend class MapEditor;  // the owner applies its edits one by one, and counts them as one delta
 
-  [[nodiscard]] std::string ApplyLists(const MapDelta& delta);
-  [[nodiscard]] std::string AddObservation(const MapDelta::ChangedObservation& change);
-  [[nodiscard]] std::string RemoveObservation(const MapDelta::ChangedObservation& change);
+  Result<> ApplyLists(const MapDelta& delta);
+  Result<> AddObservation(const MapDelta::ChangedObservation& change);
+  Result<> RemoveObservation(const MapDelta::ChangedObservation& change);
   void CountShared(KeyframeId a, KeyframeId b, int change);
 
   IdMap<KeyframeId, Keyframe> keyframes_;

@@ -7,11 +7,7 @@
 namespace tessera {
 
 // A part needs no number and no hash of its own: the delta of all edits gets them.
-void MapEditor::Apply(MapDelta&& part) {
-  if (const std::string problem = map_.ApplyLists(part); !problem.empty()) {
-    throw std::logic_error("map editor: " + problem);
-  }
-}
+void MapEditor::Apply(MapDelta&& part) { ThrowIfFailed<std::logic_error>(map_.ApplyLists(part), "map editor: "); }
 
 void MapEditor::AddKeyframe(KeyframeId id, KeyframeId parent, const Sim3& world_from_keyframe,
                             std::shared_ptr<const FeatureFrame> features) {

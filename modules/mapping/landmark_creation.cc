@@ -12,10 +12,7 @@
 namespace tessera {
 namespace {
 
-constexpr double kMinDepth = 1e-3;
-constexpr double kLineChi2 = 3.841;  // 95 %, one degree of freedom
-
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
+constexpr double kMinLandmarkDepth = 1e-3;  // of a new one, in units of the map: nearer ones are false matches
 
 LandmarkId AddLandmark(const Eigen::Vector3d& position_in_world, std::initializer_list<Observation> observations,
                        MapEditor& editor) {
@@ -41,7 +38,7 @@ class PairSearch {
         roll_(RollBetween(second_from_first_)),
         max_inverse_depth_(1.0 / min_depth) {
     for (int level = 0; level < kMaxLevels; ++level) {
-      limits_px_[static_cast<size_t>(level)] = std::sqrt(kLineChi2) * LevelScale(level);
+      limits_px_[static_cast<size_t>(level)] = std::sqrt(kChi2LimitOfOne) * LevelScale(level);
     }
     // Only what sees no landmark yet is looked for.
     std::vector<Keypoint> keypoints;
@@ -174,7 +171,7 @@ std::optional<Eigen::Vector3d> PairSearch::Triangulate(const PixelObservation& i
 bool PairSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const PixelObservation& in_first,
                               const PixelObservation& in_second) const {
   const Eigen::Vector3d point_in_second = second_from_first_ * point_in_first;
-  if (point_in_first.z() < kMinDepth || point_in_second.z() < kMinDepth) return false;
+  if (point_in_first.z() < kMinLandmarkDepth || point_in_second.z() < kMinLandmarkDepth) return false;
   for (const auto& [point, seen] : {std::pair(point_in_first, in_first), std::pair(point_in_second, in_second)}) {
     const Eigen::Vector3d residual = ReprojectionResidual(calibration_, baseline_m_, point, seen);
     if (residual.squaredNorm() > Chi2Limit(seen.has_right())) return false;

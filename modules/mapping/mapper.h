@@ -38,8 +38,8 @@ class Mapper {
   // Throws std::invalid_argument with Check()'s sentence.
   explicit Mapper(const MapperOptions& options);
 
-  // Starts with an existing map. To be called first, if at all. Returns Map::Apply's sentence.
-  [[nodiscard]] std::string Load(const MapDelta& snapshot) { return map_.Apply(snapshot); }
+  // Starts with an existing map. To be called first, if at all. Fails as Map::Apply does.
+  Result<> Load(const MapDelta& snapshot) { return map_.Apply(snapshot); }
 
   // Applies the corrections that are due, inserts the keyframe and improves the map around it. The delta is a pure
   // function of all input so far; it asks for a global adjustment after a loop was closed, unless one is under way.

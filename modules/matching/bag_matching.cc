@@ -7,8 +7,6 @@
 namespace tessera {
 namespace {
 
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
-
 struct Claim {
   int32_t first = -1;
   int distance = 257;

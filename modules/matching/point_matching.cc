@@ -5,8 +5,6 @@
 namespace tessera {
 namespace {
 
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
-
 // The best claim to each keypoint.
 class Claims {
  public:
@@ -34,10 +32,10 @@ bool IsRightNear(const PixelObservation& seen, const CameraCalibration& calibrat
 
 }  // namespace
 
-std::string MatchOptions::Check() const {
-  if (!(last_radius_px > 0.0) || !(local_radius_px > 0.0)) return "the tracker's search radii must be positive";
-  if (max_hamming < 1 || max_hamming > 256) return "tracker.max_hamming must be between 1 and 256";
-  return "";
+Result<> MatchOptions::Check() const {
+  if (!(last_radius_px > 0.0) || !(local_radius_px > 0.0)) return Failed("search radii of matching must be positive");
+  if (max_hamming < 1 || max_hamming > 256) return Failed("max_hamming of matching must be between 1 and 256");
+  return {};
 }
 
 int TrackedFrame::NumPoints() const {

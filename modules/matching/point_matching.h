@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/result.h"
 #include "matching/point_id.h"
 #include "measurement/landmark_view.h"
 
@@ -17,8 +18,7 @@ struct MatchOptions {
   int max_hamming = 100;         // bits of 256: patches of one point under changed view, nearly always
   double max_hamming_ratio = 0.8;  // best match to the second best
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 using PlacedPoints = std::vector<std::pair<PointId, Landmark>>;  // in world coordinates

@@ -4,21 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "geometry/triangulation.h"
-
 namespace tessera {
-
-double Baseline(const CameraCalibration& calibration) {
-  switch (calibration.sensor) {
-    case SensorType::kMono:
-      return 0.0;
-    case SensorType::kStereo:
-      return calibration.baseline_m;
-    case SensorType::kRgbd:
-      return kRgbdBaseline;
-  }
-  return 0.0;
-}
 
 std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe) {
   const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
@@ -39,21 +25,6 @@ double MedianDepth(const Map& map, const Keyframe& keyframe) {
 
 FeatureGrid MakeGrid(const FeatureFrame& features) {
   return {features.keypoints, features.calibration.width_px, features.calibration.height_px};
-}
-
-PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint) {
-  const Keypoint& k = features.keypoints[static_cast<size_t>(keypoint)];
-  PixelObservation seen{{k.x_px, k.y_px}, kNoColumn, kKeypointSigmaPx * LevelScale(k.level)};
-  if (features.calibration.sensor == SensorType::kStereo) {
-    seen.right_x_px = k.right_x_px >= 0.0F && k.right_x_px < k.x_px ? k.right_x_px : kNoColumn;
-  } else if (features.calibration.sensor == SensorType::kRgbd && k.depth_m > 0.0F) {
-    seen.right_x_px = k.x_px - features.calibration.fx_px * kRgbdBaseline / k.depth_m;
-  }
-  return seen;
-}
-
-std::optional<Eigen::Vector3d> PointFromDepth(const FeatureFrame& features, int32_t keypoint) {
-  return PointFromDisparity(features.calibration, Baseline(features.calibration), SeenAt(features, keypoint));
 }
 
 View::View(const CameraCalibration& camera, const Rigid3& world_from_camera) : calibration(camera) {

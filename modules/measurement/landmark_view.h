@@ -1,27 +1,16 @@
-// What a keypoint measures, and where a camera at a given pose should see a landmark.
+// Where a camera at a given pose should see a landmark.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "features/feature_types.h"
-#include "geometry/reprojection.h"
 #include "map/map.h"
 #include "measurement/feature_grid.h"
 #include "measurement/frame_view.h"
+#include "measurement/keypoint_measurement.h"
 
 namespace tessera {
-
-inline constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;  // as DescribeLandmark takes it
-
-// Standard deviation of a keypoint's coordinates, pixels of its level: what residuals of bundle adjustment show (0.55),
-// and some of the map's error. A wider one lets corners in that only look alike; they make motion come out too small.
-inline constexpr double kKeypointSigmaPx = 0.7;
-
-// A structured-light camera measures depth as a disparity over the distance of projector and camera: 75 mm in those in
-// use (Kinect, Xtion). The stereo baseline for a stereo camera; 0 for mono.
-inline constexpr double kRgbdBaseline = 0.075;
-double Baseline(const CameraCalibration& calibration);
 
 // Depths (z) of the landmarks in front of a keyframe that it sees, rising.
 std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe);
@@ -30,12 +19,6 @@ double MedianDepth(const Map& map, const Keyframe& keyframe);
 
 // The features' keypoints by place.
 FeatureGrid MakeGrid(const FeatureFrame& features);
-
-// The keypoint as a measurement; a depth as the right column that it stands for.
-PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint);
-
-// The keypoint's point by its own depth or right column, in the camera frame; nullopt where it has none.
-std::optional<Eigen::Vector3d> PointFromDepth(const FeatureFrame& features, int32_t keypoint);
 
 // A camera at a pose, ready to project many landmarks.
 struct View {

@@ -23,8 +23,6 @@ namespace tessera {
 
 // A residual behind the camera, in sigmas: constant, so that nothing draws a point there, and finite.
 inline constexpr double kBehindResidual = 100.0;
-// Points with a smaller z (meters, or units of the map) count as behind the camera.
-inline constexpr double kMinDepth = 1e-6;
 
 // Trust regions grow no larger: mono's scale has no curvature of its own, only what damping gives, and below a part of
 // 1e-10 of the diagonal rounding would leave the matrix indefinite.

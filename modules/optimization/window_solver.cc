@@ -16,11 +16,6 @@ constexpr double kMinDiagonal = 1e-6;  // of J'J where damping is scaled by it
 constexpr double kMinRelativeDecrease = 1e-3;
 constexpr double kMinModelDecrease = 1e-14;  // of the cost; below it rounding decides
 
-// Huber's loss of a squared residual, and its derivative (HuberWeight).
-double HuberLoss(double squared, double corner_squared) {
-  return squared <= corner_squared ? squared : 2.0 * std::sqrt(squared * corner_squared) - corner_squared;
-}
-
 double LossBehind(bool has_right, int num_rows) {
   return HuberLoss(num_rows * kBehindResidual * kBehindResidual, Chi2Limit(has_right));
 }

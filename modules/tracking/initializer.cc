@@ -23,9 +23,9 @@ void NormalizeDepth(MonoStart& start) {
 
 }  // namespace
 
-std::string InitializerOptions::Check() const {
+Result<> InitializerOptions::Check() const {
   if (!(radius_share > 0.0) || min_matches < 8 || max_frames < 1) {
-    return "the options of mono initialisation must be positive, and min_matches at least 8";
+    return Failed("the options of mono initialisation must be positive, and min_matches at least 8");
   }
   return two_view.Check();
 }

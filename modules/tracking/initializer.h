@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "geometry/triangulation.h"
 #include "geometry/two_view.h"
 #include "matching/matching.h"
@@ -21,8 +22,7 @@ struct InitializerOptions {
   MatchingOptions matching{50, 0.9, true};
   TwoViewOptions two_view;
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 struct MonoStart {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "matching/point_matching.h"
 #include "tracking/map_replica.h"
 
@@ -26,8 +27,7 @@ struct KeyframeDecisionOptions {
   int min_new_points = 70;            // stereo, RGB-D: near keypoints that see no known point ...
   int max_known_points = 100;         // ... while fewer near keypoints than this see one
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 class KeyframeDecision {

@@ -4,11 +4,11 @@
 
 namespace tessera {
 
-std::string MapReplica::Apply(const MapDelta& delta) {
+Result<> MapReplica::Apply(const MapDelta& delta) {
   removed_.Remember(map_, delta);
-  std::string problem = map_.Apply(delta);
+  Result<> applied = map_.Apply(delta);
   sent_.erase(sent_.begin(), sent_.upper_bound(delta.answers));  // answered in order; a snapshot answers several
-  return problem;
+  return applied;
 }
 
 std::optional<Sim3> MapReplica::PlaceOf(KeyframeId id) const {

@@ -22,8 +22,8 @@ struct SentKeyframe {
 
 class MapReplica {
  public:
-  // Returns Map::Apply's sentence. The keyframe that the delta answers is no longer on its way.
-  std::string Apply(const MapDelta& delta);
+  // As Map::Apply. The keyframe that the delta answers is no longer on its way.
+  Result<> Apply(const MapDelta& delta);
   void Send(KeyframeId id, SentKeyframe keyframe) { sent_[id] = std::move(keyframe); }
 
   const Map& map() const { return map_; }

@@ -13,8 +13,6 @@
 namespace tessera {
 namespace {
 
-size_t Index(int32_t keypoint) { return static_cast<size_t>(keypoint); }
-
 // A point placed from one view alone, in the frame of its camera; fields as in DescribeLandmark.
 Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera) {
   Landmark point;
@@ -29,29 +27,28 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
 
 }  // namespace
 
-std::string MapTrackerOptions::Check() const {
-  for (const std::string& sentence : {start.Check(), matching.Check(), keyframes.Check()}) {
-    if (!sentence.empty()) return sentence;
-  }
-  if (!(sigma_px > 0.0)) return "tracker.sigma_px must be positive";
-  if (max_unanswered_keyframes < 2) return "the tracker must send at least two keyframes without an answer";
-  if (min_inliers < 6 || max_local_keyframes < 1) return "tracker.min_inliers must be at least 6";
-  return "";
+Result<> MapTrackerOptions::Check() const {
+  TESSERA_RETURN_IF_FAILED(start.Check());
+  TESSERA_RETURN_IF_FAILED(matching.Check());
+  TESSERA_RETURN_IF_FAILED(keyframes.Check());
+  if (max_unanswered_keyframes < 2) return Failed("the tracker must send at least two keyframes without an answer");
+  if (min_inliers < 6 || max_local_keyframes < 1) return Failed("tracker.min_inliers must be at least 6");
+  return {};
 }
 
 MapTracker::MapTracker(const MapTrackerOptions& options)
     : options_(options), initializer_(options.start), decision_(options.keyframes) {
-  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+  ThrowIfFailed<std::invalid_argument>(options.Check());
 }
 
-std::string MapTracker::ApplyDelta(const MapDelta& delta) {
+Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
   // Keyframes of a map that was loaded have numbers too.
   if (delta.is_snapshot) next_keyframe_.value = std::max(next_keyframe_.value, delta.answers.value + 1);
   return replica_.Apply(delta);
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
-  const auto view = std::make_shared<const FrameView>(features, options_.sigma_px, kRgbdBaseline);
+  const auto view = std::make_shared<const FrameView>(features);
   MapTrackingResult result;
   PoseEstimate& pose = result.pose;
   pose.frame = features.frame;

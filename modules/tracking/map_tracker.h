@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "geometry/pose_optimization.h"
 #include "matching/point_matching.h"
 #include "messages/loop_types.h"
@@ -28,19 +29,17 @@ struct MapTrackerOptions {
   MatchOptions matching;
   KeyframeDecisionOptions keyframes;
   PoseOptimizationOptions pose;
-  double sigma_px = kKeypointSigmaPx;  // standard deviation of a keypoint's coordinates at level 0
-  int min_start_points = 150;          // stereo, RGB-D: keypoints with depth that a first keyframe needs
-  int min_last_matches = 20;           // fewer from the last frame: look in wider windows
-  int min_inliers = 25;                // points that a pose must agree with
-  int min_relocalised_inliers = 50;    // likewise after a loss, where chance has more room
-  int max_local_keyframes = 30;        // whose landmarks are looked for
-  int64_t max_lost_us = 1500000;       // after so long without a pose, a new part of the map begins
-  bool makes_keyframes = true;         // false: the map is used as it is, and no part is begun
-  int max_unanswered_keyframes = 8;    // live: a mapper that is far behind isn't helped by more of them
-  double max_depth_baselines = 40.0;   // stereo, RGB-D: up to here a keypoint's depth makes a point at once
+  int min_start_points = 150;         // stereo, RGB-D: keypoints with depth that a first keyframe needs
+  int min_last_matches = 20;          // fewer from the last frame: look in wider windows
+  int min_inliers = 25;               // points that a pose must agree with
+  int min_relocalised_inliers = 50;   // likewise after a loss, where chance has more room
+  int max_local_keyframes = 30;       // whose landmarks are looked for
+  int64_t max_lost_us = 1500000;      // after so long without a pose, a new part of the map begins
+  bool makes_keyframes = true;        // false: the map is used as it is, and no part is begun
+  int max_unanswered_keyframes = 8;   // live: a mapper that is far behind isn't helped by more of them
+  double max_depth_baselines = 40.0;  // stereo, RGB-D: up to here a keypoint's depth makes a point at once
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 struct MapTrackingResult {
@@ -56,8 +55,8 @@ class MapTracker {
   // Throws std::invalid_argument with Check()'s sentence.
   explicit MapTracker(const MapTrackerOptions& options);
 
-  // Applies the mapper's next change to the replica. Returns Map::Apply's sentence.
-  [[nodiscard]] std::string ApplyDelta(const MapDelta& delta);
+  // Applies the mapper's next change to the replica; fails as Map::Apply does.
+  Result<> ApplyDelta(const MapDelta& delta);
   // Frames in the order of their numbers; some may be missing. A pure function of the frames, deltas and answers so
   // far. `answer`: where this frame, or the one that asked last, was taken. `may_ask`: an answer can be had for this
   // frame.

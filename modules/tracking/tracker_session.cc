@@ -76,7 +76,7 @@ bool TrackerSession::FitsMap(const CameraCalibration& camera) {
 
 Result<> TrackerSession::ApplyDeltas(FrameId frame) {
   for (const TrackerTime::Delta& delta : time_->TakeDeltas(frame)) {
-    if (const std::string problem = tracker_.ApplyDelta(*delta); !problem.empty()) return Failed(problem);
+    TESSERA_RETURN_IF_FAILED(tracker_.ApplyDelta(*delta));
   }
   return {};
 }

@@ -97,7 +97,8 @@ std::string FromMessage(const camera_model_t& message, CameraCalibration* calibr
   if (!std::isfinite(message.baseline_m) || !std::isfinite(message.depth_unit_m)) {
     return "its baseline or depth unit is not finite";
   }
-  return calibration->Check();
+  const Result<> checked = calibration->Check();
+  return checked ? "" : checked.error().sentence;
 }
 
 std::string CheckScale(double scale) {
@@ -167,7 +168,8 @@ std::string FromMessage(const feature_options_t& message, FeatureOptions* option
               .num_levels = message.num_levels,
               .min_score = message.min_score,
               .max_disparity_px = message.max_disparity};
-  return options->Check();
+  const Result<> checked = options->Check();
+  return checked ? "" : checked.error().sentence;
 }
 
 rect_t ToMessage(const Rect& rect) {

@@ -118,7 +118,7 @@ MapDelta ReadMapFile(const std::string& path) {
   }
   if (num_pages != header.num_pages) Refuse(path, "is cut off: copy it again, or make the map again");
   Map trial;
-  if (const std::string problem = trial.Apply(snapshot); !problem.empty()) Refuse(path, "is damaged: " + problem);
+  if (const auto applied = trial.Apply(snapshot); !applied) Refuse(path, "is damaged: " + applied.error().sentence);
   if (!DoesFit(header, trial)) Refuse(path, "is damaged: its beginning speaks of another map");
   return snapshot;
 }

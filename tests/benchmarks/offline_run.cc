@@ -120,7 +120,7 @@ class Mapping {
  private:
   void Follow(const MapDelta& delta) {
     if (!run_.loop_closer) return;
-    if (const std::string problem = run_.loop_closer->ApplyDelta(delta); !problem.empty()) throw InputError(problem);
+    ThrowIfFailed<InputError>(run_.loop_closer->ApplyDelta(delta));
     if (!delta.asks_adjustment) return;
     schedule_.Ask(delta.answers, delta.number);
     schedule_.Receive(Measure(run_.adjust_ms,
@@ -142,7 +142,7 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
   for (const FeatureFrame& features : frames) {
     const MapTrackingResult result = Measure(run.track_ms, [&] {
       for (const auto& delta : time.TakeDeltas(features.frame)) {
-        if (const std::string problem = tracker.ApplyDelta(*delta); !problem.empty()) throw InputError(problem);
+        ThrowIfFailed<InputError>(tracker.ApplyDelta(*delta));
       }
       return tracker.Track(features);
     });

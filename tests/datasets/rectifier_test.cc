@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "support/dataset_folder.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -63,7 +64,7 @@ TEST(Rectifier, PassesUndistortedImagesUnchanged) {
   EXPECT_EQ(stereo.Right(image), image);
   EXPECT_EQ(stereo.calibration().baseline_m, 0.5);
   EXPECT_EQ(stereo.calibration().fx_px, 50.0);
-  EXPECT_EQ(stereo.calibration().Check(), "");
+  EXPECT_THAT(stereo.calibration().Check(), IsSuccess());
 }
 
 TEST(Rectifier, MonoImageIsThatOfThePinhole) {

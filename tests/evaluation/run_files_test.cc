@@ -13,6 +13,7 @@
 
 #include "core/errors.h"
 #include "evaluation/pose_text.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -63,7 +64,7 @@ class RunFilesTest : public testing::Test {
     Map trial;
     (void)trial.Apply(delta);
     delta.hash = trial.hash();
-    EXPECT_EQ(record.ApplyDelta(delta), "");
+    EXPECT_THAT(record.ApplyDelta(delta), IsSuccess());
     record.SetStage("tracker", {.step_ms = {3, 2.0, 1.5, 4.0, 5.0, 6.0}, .num_repaired = 2, .num_lost = 1});
     record.SetStage("extractor_0", {.num_repaired = 5});
     record.SetEnd(3, 0);
@@ -143,7 +144,7 @@ TEST_F(RunFilesTest, LoopsCsvHasARowPerLoop) {
   Map trial;
   (void)trial.Apply(delta);
   delta.hash = trial.hash();
-  ASSERT_EQ(record.ApplyDelta(delta), "");
+  ASSERT_THAT(record.ApplyDelta(delta), IsSuccess());
   EXPECT_EQ(LoopsCsv(record),
             "keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n"
             "1403636674.763555,1403636584.763555,87,1.250000\n");

@@ -7,6 +7,8 @@
 #include <memory>
 #include <numbers>
 
+#include "support/matchers.h"
+
 namespace tessera {
 namespace {
 
@@ -27,7 +29,7 @@ void Apply(RunRecord& record, MapDelta delta) {
   delta.number = trial.next_delta();
   (void)trial.Apply(delta);  // complains of the hash, which is found by it
   delta.hash = trial.hash();
-  EXPECT_EQ(record.ApplyDelta(delta), "");
+  EXPECT_THAT(record.ApplyDelta(delta), IsSuccess());
 }
 
 MapDelta NewKeyframe(int64_t id, int64_t parent, int64_t frame, const Rigid3& world_from_camera) {

@@ -9,6 +9,7 @@
 #include "features/selection.h"
 #include "features/tiling.h"
 #include "support/feature_images.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -31,9 +32,9 @@ FeatureFrame ExtractCut(const CameraFrame& frame, TileGrid grid, int coarse_leve
   const CameraCalibration calibration = MakeCalibration(frame.sensor, frame.left.width, frame.left.height);
   std::vector<TileFeatures> tiles;
   for (const TileJob& job : CutFrame(frame, calibration, 99, grid, coarse_levels_from, options)) {
-    EXPECT_EQ(CheckTileJob(job), "");
+    EXPECT_THAT(CheckTileJob(job), IsSuccess());
     tiles.push_back(extractors[random() % extractors.size()].Extract(job));
-    EXPECT_EQ(CheckTileFeatures(tiles.back()), "");
+    EXPECT_THAT(CheckTileFeatures(tiles.back()), IsSuccess());
   }
   std::shuffle(tiles.begin(), tiles.end(), random);
   return SelectFeatures(tiles);

@@ -11,6 +11,7 @@
 #include "features/selection.h"
 #include "features/tile_plan.h"
 #include "support/feature_images.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -78,11 +79,11 @@ TileJob MiddleJob(SensorType sensor) {
 
 void ExpectRefused(const std::vector<std::function<void(TileJob&)>>& harms, SensorType sensor) {
   const TileJob good = MiddleJob(sensor);
-  ASSERT_EQ(CheckTileJob(good), "");
+  ASSERT_THAT(CheckTileJob(good), IsSuccess());
   for (size_t i = 0; i < harms.size(); ++i) {
     TileJob job = good;
     harms[i](job);
-    EXPECT_NE(CheckTileJob(job), "") << ToString(sensor) << " harm " << i;
+    EXPECT_THAT(CheckTileJob(job), IsFailure(testing::_)) << ToString(sensor) << " harm " << i;
     EXPECT_THROW(Extractor().Extract(job), std::invalid_argument) << ToString(sensor) << " harm " << i;
   }
 }
@@ -134,7 +135,7 @@ TEST(CheckTileJob, RefusesMissingPixels) {
 
 TEST(CheckTileFeatures, RefusesHostileValues) {
   const TileFeatures good = Extractor().Extract(MiddleJob(SensorType::kStereo));
-  ASSERT_EQ(CheckTileFeatures(good), "");
+  ASSERT_THAT(CheckTileFeatures(good), IsSuccess());
   ASSERT_FALSE(good.candidates.empty());
   const std::vector<std::function<void(TileFeatures&)>> harms = {
       [](TileFeatures& f) { f.frame = FrameId{}; },
@@ -156,7 +157,7 @@ TEST(CheckTileFeatures, RefusesHostileValues) {
   for (size_t i = 0; i < harms.size(); ++i) {
     TileFeatures features = good;
     harms[i](features);
-    EXPECT_NE(CheckTileFeatures(features), "") << i;
+    EXPECT_THAT(CheckTileFeatures(features), IsFailure(testing::_)) << i;
   }
 }
 

@@ -78,7 +78,7 @@ TEST_P(OptimizePoseTest, RecoversThePoseAndNamesTheOutliers) {
   const auto points = MakePoints(Scene::kGeneral, truth, 200);
   std::vector<PoseObservation> observations;
   for (size_t i = 0; i < points.size(); ++i) {
-    observations.push_back({points[i], Eigen::Matrix3d::Zero(), See(truth * points[i], GetParam() && i % 3 > 0)});
+    observations.push_back({points[i], See(truth * points[i], GetParam() && i % 3 > 0)});
     if (i % 5 == 0) observations.back().seen.pixel_px += Eigen::Vector2d(25.0, -40.0);
   }
   Eigen::Matrix<double, 6, 1> error;
@@ -96,7 +96,7 @@ TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
   const Rigid3 truth{ExpSO3({0.02, -0.1, 0.03}), {0.4, -0.2, 0.6}};
   std::vector<PoseObservation> observations;
   for (const Eigen::Vector3d& point : MakePoints(Scene::kGeneral, truth, 100)) {
-    observations.push_back({point, Eigen::Matrix3d::Zero(), See(truth * point, true)});
+    observations.push_back({point, See(truth * point, true)});
   }
   const auto cost = [&](const Eigen::Matrix<double, 6, 1>& delta) {
     double sum = 0.0;

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/sha256.h"
+#include "support/matchers.h"
 #include "support/other_process.h"
 #include "support/synthetic_views.h"
 
@@ -216,11 +217,11 @@ TEST(EstimateSimilarity, SameSeedSameBits) {
 
 TEST(SimilarityOptions, OutOfRangeThrows) {
   const World world = MakeWorld({});
-  EXPECT_TRUE(SimilarityOptions{}.Check().empty());
+  EXPECT_THAT(SimilarityOptions{}.Check(), IsSuccess());
   for (const SimilarityOptions& bad :
        {SimilarityOptions{.min_inliers = 2}, SimilarityOptions{.ransac_iterations = 0},
         SimilarityOptions{.has_scale = true, .baseline_m = 0.5}, SimilarityOptions{.depth_sigma = 0.0}}) {
-    EXPECT_FALSE(bad.Check().empty());
+    EXPECT_THAT(bad.Check(), IsFailure(testing::_));
     EXPECT_THROW(EstimateSimilarity(MakeCamera(), world.pairs, 1, bad), std::invalid_argument);
     EXPECT_THROW(RefineSimilarity(MakeCamera(), world.pairs, Sim3{}, bad), std::invalid_argument);
   }

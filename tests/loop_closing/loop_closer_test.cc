@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "mapping/map_correction.h"
+#include "support/matchers.h"
 #include "support/synthetic_world.h"
 
 namespace tessera {
@@ -38,7 +39,7 @@ void PlantTwoVisits(PlantedMap& planted, const Sim3& second_from_truth, const Ch
 
 LoopCloser CloserOf(const PlantedMap& planted) {
   LoopCloser closer(ShippedVocabulary(), {});
-  for (const MapDelta& delta : planted.deltas()) EXPECT_EQ(closer.ApplyDelta(delta), "");
+  for (const MapDelta& delta : planted.deltas()) EXPECT_THAT(closer.ApplyDelta(delta), IsSuccess());
   return closer;
 }
 
@@ -166,13 +167,14 @@ TEST(LoopCloser, RefusesAThingThatStandsInTwoPlaces) {
     LoopCloserOptions credulous;
     credulous.verification.min_coverage = 0.0;
     LoopCloser closer(ShippedVocabulary(), credulous);
-    for (const MapDelta& delta : planted.deltas()) ASSERT_EQ(closer.ApplyDelta(delta), "");
+    for (const MapDelta& delta : planted.deltas()) ASSERT_THAT(closer.ApplyDelta(delta), IsSuccess());
     EXPECT_TRUE(closer.FindLoop({2 * kVisit - 1}).matched.valid());
 
     RelocalizationRequest request;
     request.features = *planted.map().FindKeyframe({2 * kVisit - 1})->features;
     LoopCloser of_first(ShippedVocabulary(), {});
-    for (int64_t k = 0; k < kVisit; ++k) ASSERT_EQ(of_first.ApplyDelta(planted.deltas()[static_cast<size_t>(k)]), "");
+    for (int64_t k = 0; k < kVisit; ++k)
+      ASSERT_THAT(of_first.ApplyDelta(planted.deltas()[static_cast<size_t>(k)]), IsSuccess());
     EXPECT_FALSE(of_first.Relocalize(request).reference.valid());
   }
 }
@@ -198,13 +200,14 @@ TEST(LoopCloser, OneThatStartsLateFromASnapshotAnswersTheSame) {
   const LoopCloser whole = CloserOf(planted);
   for (const size_t num_before : {size_t{2}, size_t{8}, planted.deltas().size()}) {
     Map map;
-    for (size_t i = 0; i < num_before; ++i) ASSERT_EQ(map.Apply(planted.deltas()[i]), "");
+    for (size_t i = 0; i < num_before; ++i) ASSERT_THAT(map.Apply(planted.deltas()[i]), IsSuccess());
     LoopCloser late(ShippedVocabulary(), {});
     if (num_before == 8) {
-      ASSERT_EQ(late.ApplyDelta(planted.deltas()[0]), "");  // it had begun, and went wrong
+      ASSERT_THAT(late.ApplyDelta(planted.deltas()[0]), IsSuccess());  // it had begun, and went wrong
     }
-    ASSERT_EQ(late.ApplyDelta(map.Snapshot()), "");
-    for (size_t i = num_before; i < planted.deltas().size(); ++i) ASSERT_EQ(late.ApplyDelta(planted.deltas()[i]), "");
+    ASSERT_THAT(late.ApplyDelta(map.Snapshot()), IsSuccess());
+    for (size_t i = num_before; i < planted.deltas().size(); ++i)
+      ASSERT_THAT(late.ApplyDelta(planted.deltas()[i]), IsSuccess());
     for (int64_t k = 0; k < 2 * kVisit; ++k) ExpectSame(late.FindLoop({k}), whole.FindLoop({k}));
   }
 }
@@ -221,7 +224,7 @@ TEST(LoopCloser, CulledKeyframesAreNoPlacesAnyMore) {
     if (keyframe.parent == matched) editor.SetParent(id, planted.map().FindKeyframe(matched)->parent);
   });
   editor.RemoveKeyframe(matched);
-  ASSERT_EQ(closer.ApplyDelta(editor.Finish({2 * kVisit - 1})), "");
+  ASSERT_THAT(closer.ApplyDelta(editor.Finish({2 * kVisit - 1})), IsSuccess());
   const LoopResult loop = closer.FindLoop({2 * kVisit - 1});
   ASSERT_TRUE(loop.matched.valid()) << "its neighbors show the place as well";
   EXPECT_NE(loop.matched, matched);
@@ -229,7 +232,7 @@ TEST(LoopCloser, CulledKeyframesAreNoPlacesAnyMore) {
   for (int64_t k = 0; k < kVisit; ++k) {
     if (planted.map().FindKeyframe({k}) != nullptr) rest.RemoveKeyframe({k});
   }
-  ASSERT_EQ(closer.ApplyDelta(rest.Finish({2 * kVisit - 1})), "");
+  ASSERT_THAT(closer.ApplyDelta(rest.Finish({2 * kVisit - 1})), IsSuccess());
   EXPECT_EQ(closer.FindLoop({2 * kVisit - 1}).num_candidates, 0);
   EXPECT_EQ(closer.Relocalize({*planted.map().FindKeyframe({2 * kVisit - 1})->features, {}}).reference.value / kVisit,
             1);
@@ -247,7 +250,7 @@ TEST(Relocalization, FindsACameraInEachUnitOfTheMap) {
       (void)editor.Finish({kVisit - 1});
     }
     LoopCloser closer(ShippedVocabulary(), {});
-    ASSERT_EQ(closer.ApplyDelta(planted.map().Snapshot()), "");
+    ASSERT_THAT(closer.ApplyDelta(planted.map().Snapshot()), IsSuccess());
     RelocalizationRequest request;
     request.features = world.Take(5).features;
     request.features.frame = {321};

@@ -9,6 +9,7 @@
 
 #include "loop_closing/loop_closer.h"
 #include "mapping/mapper.h"
+#include "support/matchers.h"
 #include "support/synthetic_world.h"
 #include "tracking/map_tracker.h"
 
@@ -36,8 +37,8 @@ class Carried {
     for (const KeyframeObservation& keyframe : result.keyframes) Apply(mapper.Process(keyframe));
   }
   void Apply(const MapDelta& delta) {
-    EXPECT_EQ(tracker.ApplyDelta(delta), "");
-    EXPECT_EQ(closer.ApplyDelta(delta), "");
+    EXPECT_THAT(tracker.ApplyDelta(delta), IsSuccess());
+    EXPECT_THAT(closer.ApplyDelta(delta), IsSuccess());
   }
   // Drives from step `first` to `last`; every frame must be tracked.
   void Drive(int64_t first, int64_t last) {

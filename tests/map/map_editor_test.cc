@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "support/matchers.h"
+
 namespace tessera {
 namespace {
 
@@ -81,7 +83,7 @@ TEST(MapEditor, ItsDeltaDoesToAReplicaWhatTheEditsDidToTheMap) {
     Map owner, replica;
     for (int step = 0; step < 25; ++step) {
       const MapDelta delta = RandomStep(owner, generator);
-      ASSERT_EQ(replica.Apply(delta), "") << "seed " << seed << " step " << step;
+      ASSERT_THAT(replica.Apply(delta), IsSuccess()) << "seed " << seed << " step " << step;
       ASSERT_EQ(replica.next_delta(), owner.next_delta());
     }
     EXPECT_EQ(replica.Sha256Hex(), owner.Sha256Hex());

@@ -8,6 +8,7 @@
 #include "map/map_archive.h"
 #include "map/removed_keyframes.h"
 #include "support/map_changes.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -20,7 +21,7 @@ class Owner {
   Owner(unsigned seed, int num_loaded) : generator_(seed) {
     Map made;
     for (int i = 0; i < num_loaded; ++i) RandomChange(made, generator_);
-    EXPECT_EQ(map_.Apply(made.Snapshot()), "");
+    EXPECT_THAT(map_.Apply(made.Snapshot()), IsSuccess());
     archive_.Begin(map_);
   }
 
@@ -46,15 +47,15 @@ class Owner {
   int num_pages_ = 0;
 };
 
-// Applies what can be applied. Returns what was wrong.
-std::string Update(MapFollower& follower, Map& replica) {
+// Applies what can be applied.
+Result<> Update(MapFollower& follower, Map& replica) {
   for (const auto& delta : follower.Take()) {
-    if (std::string problem = replica.Apply(*delta); !problem.empty()) {
+    if (const Result<> applied = replica.Apply(*delta); !applied) {
       follower.Reject();
-      return problem;
+      return applied;
     }
   }
-  return "";
+  return {};
 }
 
 void ExpectEqual(const Map& replica, const Map& owner) {
@@ -76,7 +77,7 @@ TEST(MapFollower, PutsDeltasInOrderEachOnce) {
     Map replica;
     for (const auto& delta : arriving) {
       follower.Receive(delta);
-      EXPECT_EQ(Update(follower, replica), "");
+      EXPECT_THAT(Update(follower, replica), IsSuccess());
     }
     EXPECT_FALSE(follower.Request());
     ExpectEqual(replica, owner.map());
@@ -90,12 +91,12 @@ TEST(MapFollower, AsksForAShortGapAndGetsTheDeltas) {
   for (int i = 0; i < 20; ++i) {
     const auto delta = owner.Next();
     if (i < 10 || i > 12) follower.Receive(delta);
-    EXPECT_EQ(Update(follower, replica), "");
+    EXPECT_THAT(Update(follower, replica), IsSuccess());
     EXPECT_EQ(follower.Request().has_value(), i > 12);
   }
   EXPECT_EQ(replica.next_delta(), 10);
   owner.Answer(*follower.Request(), follower);
-  EXPECT_EQ(Update(follower, replica), "");
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
   EXPECT_FALSE(follower.Request());
   EXPECT_EQ(owner.num_pages(), 0) << "no snapshot is needed";
   ExpectEqual(replica, owner.map());
@@ -109,11 +110,11 @@ TEST(MapFollower, AsksForALostTailWhenToldOfIt) {
     const auto delta = owner.Next();
     if (i < 3) follower.Receive(delta);
   }
-  EXPECT_EQ(Update(follower, replica), "");
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
   EXPECT_FALSE(follower.Request());
   follower.Expect(5);
   owner.Answer(follower.Request().value(), follower);
-  EXPECT_EQ(Update(follower, replica), "");
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
   EXPECT_FALSE(follower.Request());
   ExpectEqual(replica, owner.map());
 }
@@ -129,7 +130,7 @@ void JoinLate(int num_before, bool hears_deltas) {
     owner.Answer(*follower.Request(), follower);
     const auto delta = num_rounds < 100 ? owner.Next() : nullptr;
     if (delta != nullptr && hears_deltas) follower.Receive(delta);
-    EXPECT_EQ(Update(follower, replica), "");
+    EXPECT_THAT(Update(follower, replica), IsSuccess());
   }
   EXPECT_LT(num_rounds, 1000);
   EXPECT_GT(owner.num_pages(), 3);
@@ -137,9 +138,9 @@ void JoinLate(int num_before, bool hears_deltas) {
     follower.Receive(owner.Next());
     while (follower.Request()) {
       owner.Answer(*follower.Request(), follower);
-      EXPECT_EQ(Update(follower, replica), "");
+      EXPECT_THAT(Update(follower, replica), IsSuccess());
     }
-    EXPECT_EQ(Update(follower, replica), "");
+    EXPECT_THAT(Update(follower, replica), IsSuccess());
   }
   ExpectEqual(replica, owner.map());
 }
@@ -159,12 +160,12 @@ TEST(MapFollower, WhoComesLateToAYoungMapGetsItsDeltas) {
   EXPECT_TRUE(follower.Request()) << "there is no map yet";
   for (int i = 0; i < 40; ++i) owner.Next();
   owner.Answer(*follower.Request(), follower);
-  EXPECT_EQ(Update(follower, replica), "");
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
   EXPECT_EQ(replica.next_delta(), static_cast<int64_t>(MapArchive::kMaxDeltas));
   follower.Expect(40);
   while (follower.Request()) {
     owner.Answer(*follower.Request(), follower);
-    EXPECT_EQ(Update(follower, replica), "");
+    EXPECT_THAT(Update(follower, replica), IsSuccess());
   }
   EXPECT_EQ(owner.num_pages(), 0);
   ExpectEqual(replica, owner.map());
@@ -182,13 +183,13 @@ TEST(MapFollower, AWrongHashIsFoundAndMendedByASnapshot) {
       delta = wrong;
     }
     follower.Receive(delta);
-    const std::string problem = Update(follower, replica);
-    EXPECT_EQ(problem.find("wrong hash") != std::string::npos, i == 20) << problem;
+    const Result<> updated = Update(follower, replica);
+    EXPECT_EQ(testing::Value(updated, IsFailure(HasSubstr("wrong hash"))), i == 20);
     EXPECT_EQ(follower.needs_snapshot(), i >= 20 && i <= 22);
     if (i < 22) continue;
     while (follower.Request()) {
       owner.Answer(*follower.Request(), follower);
-      EXPECT_EQ(Update(follower, replica), "");
+      EXPECT_THAT(Update(follower, replica), IsSuccess());
     }
   }
   EXPECT_GT(owner.num_pages(), 1);
@@ -200,7 +201,7 @@ TEST(MapFollower, PagesForOthersAreNoBusinessOfOnesOwn) {
   MapFollower follower, late(true);
   Map replica;
   for (int i = 0; i < 20; ++i) follower.Receive(owner.Next());
-  EXPECT_EQ(Update(follower, replica), "");
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
   while (late.Request()) {
     owner.Answer(*late.Request(), late);
     follower.Receive(CutSnapshotPage(owner.map().Snapshot(), 0));
@@ -218,16 +219,16 @@ TEST(MapArchive, SeveralFollowersMayReadDifferentSnapshots) {
     const auto i = static_cast<size_t>(round % 4);
     if (round < 30) owner.Next();  // each begins at another time
     if (const auto request = followers[i].Request()) owner.Answer(*request, followers[i]);
-    EXPECT_EQ(Update(followers[i], replicas[i]), "");
+    EXPECT_THAT(Update(followers[i], replicas[i]), IsSuccess());
   }
   const auto last = owner.Next();
   for (size_t i = 0; i < followers.size(); ++i) {
     followers[i].Receive(last);
     while (followers[i].Request()) {
       owner.Answer(*followers[i].Request(), followers[i]);
-      EXPECT_EQ(Update(followers[i], replicas[i]), "");
+      EXPECT_THAT(Update(followers[i], replicas[i]), IsSuccess());
     }
-    EXPECT_EQ(Update(followers[i], replicas[i]), "");
+    EXPECT_THAT(Update(followers[i], replicas[i]), IsSuccess());
     ExpectEqual(replicas[i], owner.map());
   }
 }
@@ -285,7 +286,7 @@ TEST(MapArchive, BeginsWithALoadedMap) {
     while (late.Request()) {
       owner.Answer(*late.Request(), late);
       late.Expect(owner.map().next_delta());
-      EXPECT_EQ(Update(late, replica), "");
+      EXPECT_THAT(Update(late, replica), IsSuccess());
     }
     ExpectEqual(replica, owner.map());
   }
@@ -298,12 +299,12 @@ TEST(RemovedKeyframes, KeepTheirPlaceAcrossASnapshot) {
   for (int i = 0; i < 4; ++i) {
     const auto delta = owner.Next();
     removed.Remember(replica, *delta);
-    ASSERT_EQ(replica.Apply(*delta), "");
+    ASSERT_THAT(replica.Apply(*delta), IsSuccess());
   }
   owner.Next();  // takes keyframe 1 away, and is missed
   const MapDelta snapshot = owner.map().Snapshot();
   removed.Remember(replica, snapshot);
-  ASSERT_EQ(replica.Apply(snapshot), "");
+  ASSERT_THAT(replica.Apply(snapshot), IsSuccess());
   EXPECT_EQ(replica.FindKeyframe({1}), nullptr);
   EXPECT_EQ(removed.Successor(replica, {1}), KeyframeId{0});
   EXPECT_TRUE(removed.Find(replica, {1}).has_value());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/map_changes.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -18,9 +19,9 @@ TEST(Map, ReplicasOfTheSameDeltasAreEqualAndASnapshotLeadsToTheSame) {
   Map owner, replica;
   for (int i = 0; i < 30; ++i) {
     const MapDelta delta = RandomChange(owner, generator);
-    ASSERT_EQ(replica.Apply(delta), "");
+    ASSERT_THAT(replica.Apply(delta), IsSuccess());
     Map late;
-    ASSERT_EQ(late.Apply(owner.Snapshot()), "");
+    ASSERT_THAT(late.Apply(owner.Snapshot()), IsSuccess());
     EXPECT_EQ(late.hash(), owner.hash());
     EXPECT_EQ(late.next_delta(), owner.next_delta());
     EXPECT_EQ(late.Sha256Hex(), owner.Sha256Hex());
@@ -64,7 +65,7 @@ TEST(Map, TheHashCoversEveryKeypoint) {
   features->keypoints.back().angle ^= 1;
   delta.new_keyframes[0].features = features;
   Map other;
-  EXPECT_NE(other.Apply(delta).find("wrong hash"), std::string::npos);
+  EXPECT_THAT(other.Apply(delta), IsFailure(HasSubstr("wrong hash")));
   EXPECT_NE(other.Sha256Hex(), map.Sha256Hex());
 }
 
@@ -72,10 +73,10 @@ TEST(Map, TheHashCoversEveryKeypoint) {
 bool IsNoticed(const std::function<void(MapDelta&)>& change) {
   std::mt19937 generator(6);
   Map owner, replica;
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(replica.Apply(RandomChange(owner, generator)), "");
+  for (int i = 0; i < 3; ++i) EXPECT_THAT(replica.Apply(RandomChange(owner, generator)), IsSuccess());
   MapDelta delta = RandomChange(owner, generator);  // moves a keyframe, and closes a loop
   change(delta);
-  const bool is_noticed = replica.Apply(delta).find("wrong hash") != std::string::npos;
+  const bool is_noticed = testing::Value(replica.Apply(delta), IsFailure(HasSubstr("wrong hash")));
   EXPECT_EQ(is_noticed, replica.Sha256Hex() != owner.Sha256Hex());
   return is_noticed;
 }
@@ -123,7 +124,7 @@ TEST(Map, ScaleAndLoopsComeFromTheDeltas) {
 TEST(Map, RefusesIdsThatLeapAhead) {
   MapDelta delta;
   delta.changed_landmarks.push_back({{int64_t{1} << 40}, {}});
-  EXPECT_NE(Map().Apply(delta).find("can't be added"), std::string::npos);
+  EXPECT_THAT(Map().Apply(delta), IsFailure(HasSubstr("can't be added")));
 }
 
 TEST(Map, CovisibilityCountsSharedLandmarks) {
@@ -148,19 +149,19 @@ TEST(Map, SaysWhatIsWrongWithADelta) {
   Map map;
   const MapDelta first = RandomChange(map, generator);
   Map replica = map;
-  EXPECT_NE(replica.Apply(first).find("was expected"), std::string::npos);
+  EXPECT_THAT(replica.Apply(first), IsFailure(HasSubstr("was expected")));
   MapDelta wrong;
   wrong.number = map.next_delta();
   wrong.hash = map.hash() + 1;
-  EXPECT_NE(Map(map).Apply(wrong).find("wrong hash"), std::string::npos);
+  EXPECT_THAT(Map(map).Apply(wrong), IsFailure(HasSubstr("wrong hash")));
   wrong.moved_keyframes.push_back({{99}, {}});
-  EXPECT_NE(Map(map).Apply(wrong).find("keyframe 99"), std::string::npos);
+  EXPECT_THAT(Map(map).Apply(wrong), IsFailure(HasSubstr("keyframe 99")));
   wrong.moved_keyframes.clear();
   wrong.new_observations.push_back({{0}, {{0}, kKeypointsPerKeyframe}});
-  EXPECT_NE(Map(map).Apply(wrong).find("can't observe"), std::string::npos);
+  EXPECT_THAT(Map(map).Apply(wrong), IsFailure(HasSubstr("can't observe")));
   wrong.new_observations.clear();
   wrong.removed_landmarks.push_back({0});
-  EXPECT_NE(Map(map).Apply(wrong).find("can't be removed"), std::string::npos) << "it is still observed";
+  EXPECT_THAT(Map(map).Apply(wrong), IsFailure(HasSubstr("can't be removed"))) << "it is still observed";
 }
 
 }  // namespace

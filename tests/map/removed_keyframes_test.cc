@@ -6,6 +6,7 @@
 
 #include "map/map_editor.h"
 #include "support/map_changes.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -46,7 +47,7 @@ MapDelta Remove(Map& map, const std::vector<KeyframeId>& ids, RemovedKeyframes& 
   }
   delta = WithHash(map, delta);
   removed.Remember(map, delta);
-  EXPECT_EQ(map.Apply(delta), "");
+  EXPECT_THAT(map.Apply(delta), IsSuccess());
   return delta;
 }
 

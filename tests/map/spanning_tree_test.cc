@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "support/map_changes.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -65,7 +66,7 @@ TEST(SpanningTree, HangingKeepsEveryEdgeAndJoinsTheTwo) {
     edges.insert(std::minmax(hung, parent));
     MapEditor editor(map);
     HangBelow(hung, parent, editor);
-    EXPECT_EQ(replica.Apply(editor.Finish({40})), "");
+    EXPECT_THAT(replica.Apply(editor.Finish({40})), IsSuccess());
     EXPECT_EQ(EdgesOf(map), edges) << seed;
     EXPECT_EQ(map.FindKeyframe(hung)->parent, parent);
     for (int64_t id = 0; id < 40; ++id) {

@@ -9,6 +9,7 @@
 
 #include "map/spanning_tree.h"
 #include "optimization/global_adjustment.h"
+#include "support/matchers.h"
 #include "support/synthetic_world.h"
 
 namespace tessera {
@@ -28,7 +29,7 @@ void EditBoth(Map& map, Edit edit) {
   Map replica = map;
   MapEditor editor(map);
   edit(editor);
-  EXPECT_EQ(replica.Apply(editor.Finish(map.answered())), "");
+  EXPECT_THAT(replica.Apply(editor.Finish(map.answered())), IsSuccess());
   EXPECT_EQ(replica.Sha256Hex(), map.Sha256Hex());
 }
 

@@ -7,6 +7,7 @@
 #include "map/spanning_tree.h"
 #include "mapping/mapper.h"
 #include "optimization/global_adjustment.h"
+#include "support/matchers.h"
 #include "support/synthetic_world.h"
 
 namespace tessera {
@@ -22,7 +23,7 @@ class LoopMapper : public testing::Test {
     for (int64_t k = 0; k < 6; ++k) planted_.Add(k, {k - 1}, 0);
     for (int64_t k = 6; k < 12; ++k) planted_.Add(k - 6, k == 6 ? KeyframeId{} : KeyframeId{k - 1}, 1, kAway);
     EXPECT_EQ(mapper_.Load(planted_.map().Snapshot()), "");
-    EXPECT_EQ(replica_.Apply(planted_.map().Snapshot()), "");
+    EXPECT_THAT(replica_.Apply(planted_.map().Snapshot()), IsSuccess());
   }
 
   // The next keyframe, as a tracker in the second part tells it: relative to the one before, and seeing its landmarks.
@@ -48,7 +49,7 @@ class LoopMapper : public testing::Test {
     }
     ++next_;
     delta_ = mapper_.Process(seen, due);
-    EXPECT_EQ(replica_.Apply(delta_), "");
+    EXPECT_THAT(replica_.Apply(delta_), IsSuccess());
     EXPECT_EQ(replica_.Sha256Hex(), mapper_.map().Sha256Hex());
     return delta_;
   }
@@ -168,12 +169,12 @@ TEST_F(LoopMapper, AtTheEndTheMapIsCorrectedOnceMore) {
   EXPECT_TRUE(corrected->asks_adjustment);
   EXPECT_EQ(corrected->answers, KeyframeId{12});
   EXPECT_TRUE(corrected->new_keyframes.empty());
-  EXPECT_EQ(replica_.Apply(*corrected), "");
+  EXPECT_THAT(replica_.Apply(*corrected), IsSuccess());
   const GlobalAdjustment adjustment = AdjustGlobally(replica_, corrected->answers, GlobalBundleOptions());
   const std::optional<MapDelta> adjusted = mapper_.Finish({{}, adjustment});
   ASSERT_TRUE(adjusted.has_value());
   EXPECT_FALSE(adjusted->asks_adjustment);
-  EXPECT_EQ(replica_.Apply(*adjusted), "");
+  EXPECT_THAT(replica_.Apply(*adjusted), IsSuccess());
   EXPECT_EQ(replica_.Sha256Hex(), mapper_.map().Sha256Hex());
   EXPECT_LT(WorstKeyframe(), 0.05);
 }

@@ -101,9 +101,9 @@ inline MapDelta RandomChange(Map& map, std::mt19937& generator) {
   }
   // The hash is found by trying on a copy, whose complaint about the missing hash is expected.
   Map trial = map;
-  EXPECT_NE(trial.Apply(delta).find("wrong hash"), std::string::npos);
+  EXPECT_THAT(trial.Apply(delta), IsFailure(HasSubstr("wrong hash")));
   delta.hash = trial.hash();
-  EXPECT_EQ(map.Apply(delta), "");
+  EXPECT_THAT(map.Apply(delta), IsSuccess());
   return delta;
 }
 

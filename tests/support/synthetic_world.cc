@@ -107,7 +107,7 @@ TrackedFrame SyntheticWorld::TrackedAt(int64_t step) {
 }
 
 std::shared_ptr<const FrameView> ViewOf(const FeatureFrame& features) {
-  return std::make_shared<const FrameView>(features, kKeypointSigmaPx, kRgbdBaseline);
+  return std::make_shared<const FrameView>(features);
 }
 
 KeyframeId PlantedMap::Add(int64_t step, KeyframeId parent, int visit, const Sim3& map_from_truth,

@@ -7,6 +7,7 @@
 
 #include "map/map_editor.h"
 #include "support/map_changes.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -57,7 +58,7 @@ void ExpectNear(const Sim3& a, const Sim3& b) {
 TEST(MapReplica, WhatIsOnItsWayHasTheUnitsOfItsReference) {
   Owner owner;
   MapReplica replica;
-  ASSERT_EQ(replica.Apply(owner.first()), "");
+  ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
   replica.Send({3}, {{2}, kStep, {}});
   const Sim3 second = Sim3::From(kStep, 1.25) * kStep;
@@ -73,11 +74,11 @@ TEST(MapReplica, WhatIsOnItsWayHasTheUnitsOfItsReference) {
 TEST(MapReplica, BendingTakesAlongWhatIsOnItsWay) {
   Owner owner;
   MapReplica replica;
-  ASSERT_EQ(replica.Apply(owner.first()), "");
+  ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
   const Sim3 place = replica.PlaceOf({2}).value();
   const Landmark before = replica.Find({{}, {2}, 0}).value();
-  ASSERT_EQ(replica.Apply(owner.Bend()), "");
+  ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
   ExpectNear(replica.PlaceOf({2}).value(), kBend * place);
   const Landmark after = replica.Find({{}, {2}, 0}).value();
   EXPECT_LT((after.position_in_world - kBend * before.position_in_world).norm(), 1e-9);
@@ -90,13 +91,13 @@ TEST(MapReplica, BendingTakesAlongWhatIsOnItsWay) {
 TEST(MapReplica, AReferenceThatIsCulledLeavesItsPlace) {
   Owner owner;
   MapReplica replica;
-  ASSERT_EQ(replica.Apply(owner.first()), "");
+  ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {}});
   const Sim3 place = replica.PlaceOf({2}).value();
-  ASSERT_EQ(replica.Apply(owner.Edit([](MapEditor& editor) { editor.RemoveKeyframe({1}); })), "");
+  ASSERT_THAT(replica.Apply(owner.Edit([](MapEditor& editor) { editor.RemoveKeyframe({1}); })), IsSuccess());
   EXPECT_EQ(replica.map().FindKeyframe({1}), nullptr);
   ExpectNear(replica.PlaceOf({2}).value(), place);
-  ASSERT_EQ(replica.Apply(owner.Bend()), "");
+  ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
   ExpectNear(replica.PlaceOf({1}).value(), kBend * Sim3::From(kStep, 1.25));
   ExpectNear(replica.PlaceOf({2}).value(), kBend * place);
 }
@@ -105,9 +106,9 @@ TEST(MapReplica, AReferenceThatIsCulledLeavesItsPlace) {
 TEST(MapReplica, TheAnswerTakesOver) {
   Owner owner;
   MapReplica replica;
-  ASSERT_EQ(replica.Apply(owner.first()), "");
+  ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
-  ASSERT_EQ(replica.Apply(owner.Bend()), "");
+  ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
   const Sim3 place = replica.PlaceOf({2}).value();
   const Landmark point = replica.Find({{}, {2}, 0}).value();
   LandmarkId name;
@@ -118,7 +119,7 @@ TEST(MapReplica, TheAnswerTakesOver) {
         editor.AddObservation(name, {{2}, 0});
       },
       {2});
-  ASSERT_EQ(replica.Apply(answer), "");
+  ASSERT_THAT(replica.Apply(answer), IsSuccess());
   EXPECT_TRUE(replica.sent().empty());
   ExpectNear(replica.PlaceOf({2}).value(), place);
   EXPECT_EQ(replica.Renew({{}, {2}, 0}).landmark, name);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "mapping/mapper.h"
+#include "support/matchers.h"
 #include "support/synthetic_world.h"
 #include "tracking/tracker_time.h"
 
@@ -25,7 +26,7 @@ void Follow(SyntheticWorld world, int64_t num_frames, int64_t delay_frames, cons
     const FeatureFrame features = world.Take(step).features;
     if (std::find(dropped.begin(), dropped.end(), step) != dropped.end()) continue;
     ASSERT_TRUE(time.HasDeltas(features.frame));
-    for (const auto& delta : time.TakeDeltas(features.frame)) ASSERT_EQ(tracker.ApplyDelta(*delta), "");
+    for (const auto& delta : time.TakeDeltas(features.frame)) ASSERT_THAT(tracker.ApplyDelta(*delta), IsSuccess());
     const MapTrackingResult result = tracker.Track(features);
     outcome.poses.push_back(result.pose);
     for (const KeyframeObservation& keyframe : result.keyframes) {
@@ -96,7 +97,7 @@ TEST(MapTracker, FindsItselfAgainAfterBlindFrames) {
     const MapTrackingResult result = tracker.Track(features);
     states.push_back(result.pose.state);
     for (const KeyframeObservation& keyframe : result.keyframes) {
-      ASSERT_EQ(tracker.ApplyDelta(mapper.Process(keyframe)), "");
+      ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
     }
   }
   EXPECT_EQ(states[7], TrackingState::kLost);

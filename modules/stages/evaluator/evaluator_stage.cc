@@ -92,8 +92,8 @@ void EvaluatorStage::OnEnd(const EndOfStream& end) {
 
 void EvaluatorStage::OnDeltas() {
   for (const auto& delta : map_.Take()) {
-    if (const std::string problem = record_.ApplyDelta(*delta); !problem.empty()) {
-      map_.Reject(problem);
+    if (const Result<> applied = record_.ApplyDelta(*delta); !applied) {
+      map_.Reject(applied.error().sentence);
       break;
     }
   }

@@ -73,8 +73,8 @@ void ExtractorStage::Serve(size_t robot) {
 
 void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
   Robot& owner = robots_[robot];
-  std::string problem = CheckTileJob(job);
-  if (problem.empty()) {
+  Result<> accepted = CheckTileJob(job);
+  if (accepted) {
     if (job.run != owner.run) {
       // The robot's stack was started again: nobody waits for what its predecessor wanted.
       queue_.Drop(robot);
@@ -82,11 +82,11 @@ void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
       owner.run = job.run;
     }
     owner.job_came_us = context_.now_us();
-    if (!queue_.Push(robot, WorkOf(job), job)) problem = "too many jobs of this robot wait already";
+    if (!queue_.Push(robot, WorkOf(job), job)) accepted = Failed("too many jobs of this robot wait already");
   }
-  if (!problem.empty()) {
+  if (!accepted) {
     owner.context->ReportError("job for frame " + std::to_string(job.frame.value) + ", tile " +
-                               std::to_string(job.tile) + " is refused: " + problem);
+                               std::to_string(job.tile) + " is refused: " + accepted.error().sentence);
   }
   owner.context->SetQueue(static_cast<int64_t>(queue_.num_waiting(robot)));
   if (!is_pool()) DoNextJob();  // nobody to be fair to: as it comes

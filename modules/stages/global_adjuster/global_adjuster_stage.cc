@@ -30,7 +30,7 @@ GlobalAdjusterStage::GlobalAdjusterStage(StageContext& context)
 }
 
 Result<> GlobalAdjusterStage::Apply(const MapDelta& delta) {
-  if (const std::string problem = replica_.Apply(delta); !problem.empty()) return Failed(problem);
+  TESSERA_RETURN_IF_FAILED(replica_.Apply(delta));
   if (delta.asks_adjustment) {
     const StepTimer timer(context_);
     adjustments_.Publish(AdjustGlobally(replica_, delta.answers, options_));

@@ -29,7 +29,7 @@ MapWriterStage::MapWriterStage(StageContext& context)
 }
 
 Result<> MapWriterStage::Apply(const MapDelta& delta) {
-  if (const std::string problem = replica_.Apply(delta); !problem.empty()) return Failed(problem);
+  TESSERA_RETURN_IF_FAILED(replica_.Apply(delta));
   context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));
   return {};
 }

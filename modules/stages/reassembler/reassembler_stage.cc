@@ -43,9 +43,9 @@ void ReassemblerStage::OnTile(const TileFeatures& tile) {
     context_.SetValue("answers_of_other_runs", static_cast<double>(++num_of_other_runs_));
     return;
   }
-  if (const std::string problem = CheckTileFeatures(tile); !problem.empty()) {
+  if (const Result<> checked = CheckTileFeatures(tile); !checked) {
     context_.ReportError("candidates of frame " + std::to_string(tile.frame.value) + ", tile " +
-                         std::to_string(tile.tile) + " are refused: " + problem);
+                         std::to_string(tile.tile) + " are refused: " + checked.error().sentence);
     return;
   }
   if (assembler_.Add(tile) == FrameAssembler::Result::kRefused) {

@@ -22,9 +22,7 @@ MapTrackerOptions OptionsFrom(const Settings& settings) {
   options.keyframes.min_share = settings.Get<double>("tracker.keyframe_min_share");
   options.keyframes.min_parallax_rad = settings.Get<double>("tracker.keyframe_min_parallax_rad");
   options.keyframes.max_interval_us = std::llround(1e6 * settings.Get<double>("tracker.keyframe_max_interval_s"));
-  if (const std::string problem = options.Check(); !problem.empty()) {
-    throw InputError(problem);
-  }
+  ThrowIfFailed<InputError>(options.Check(), "tracker: ");
   return options;
 }
 

@@ -1,0 +1,27 @@
+// What a keypoint measures, and how exactly.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "features/feature_types.h"
+#include "features/pyramid.h"
+#include "geometry/keypoint_noise.h"
+#include "geometry/reprojection.h"
+
+namespace tessera {
+
+// A structured-light camera measures depth as a disparity over the distance of projector and camera: 75 mm in those in
+// use (Kinect, Xtion).
+inline constexpr double kRgbdBaseline = 0.075;
+// Baseline that turns depths into right columns, meters: the pair's, or that virtual one; 0 for mono.
+double Baseline(const CameraCalibration& calibration);
+
+// The keypoint as a measurement, with the noise of its level; a depth as the right column that it stands for.
+PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint);
+
+// The keypoint's point by its own depth or right column, in the camera frame; nullopt where it has none.
+std::optional<Eigen::Vector3d> PointFromDepth(const FeatureFrame& features, int32_t keypoint);
+
+}  // namespace tessera
