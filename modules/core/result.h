@@ -34,6 +34,12 @@ inline Result<> Require(bool holds, const char* sentence) {
   return Failed(sentence);
 }
 
+// Where a problem ends: ThrowIfFailed<InputError>(options.Check(), "tracker: ") throws the sentence behind the prefix.
+template <class Exception>
+void ThrowIfFailed(const Result<>& result, const std::string& prefix = "") {
+  if (!result) throw Exception(prefix + result.error().sentence);
+}
+
 }  // namespace tessera
 
 // Returns the problem of `expression`, a Result, to this function's caller, if it has one.

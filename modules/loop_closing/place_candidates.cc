@@ -16,7 +16,7 @@ struct Group {
 };
 
 // Neighboring keyframes look alike, so their scores are added: a place of which only one image matches is weak. Best
-// group first, each named by its best keyframe (of equals, which a camera that stands still makes, the oldest); groups
+// group first, each named by its best keyframe (if equal, as a camera at rest makes them, the oldest); groups
 // with the same best keyframe are one.
 std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::Place>& found,
                               const CandidateOptions& options) {

@@ -103,7 +103,7 @@ class PoseGraphSolver {
     ceres::Solver::Summary summary;
     ceres::Solve(SolverOptions(options_), &ceres_problem, &summary);
     if (!summary.IsSolutionUsable()) return std::nullopt;
-    return Result();
+    return Solution();
   }
 
  private:
@@ -151,41 +151,40 @@ class PoseGraphSolver {
 
 }  // namespace
 
-std::string PoseGraphProblem::Check() const {
+Result<> PoseGraphProblem::Check() const {
   const auto is_index = [&](int index) { return index >= 0 && static_cast<size_t>(index) < nodes.size(); };
   for (size_t i = 0; i < edges.size(); ++i) {
     const std::string name = "edge " + std::to_string(i);
     if (!is_index(edges[i].from) || !is_index(edges[i].to) || edges[i].from == edges[i].to) {
-      return name + " must name two different nodes of the problem";
+      return Failed(name + " must name two different nodes of the problem");
     }
     if (!(edges[i].weight > 0.0) || !(edges[i].length > 0.0) || !(edges[i].to_from_from.scale > 0.0)) {
-      return name + " has a weight, a length or a scale that is not positive";
+      return Failed(name + " has a weight, a length or a scale that is not positive");
     }
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
     if (!(nodes[i].world_from_keyframe.scale > 0.0)) {
-      return "node " + std::to_string(i) + " has a scale that is not positive";
+      return Failed("node " + std::to_string(i) + " has a scale that is not positive");
     }
   }
   if (std::none_of(nodes.begin(), nodes.end(), [](const PoseGraphNode& node) { return node.is_fixed; })) {
-    return "no node is fixed; fix one at least (gauge)";
+    return Failed("no node is fixed; fix one at least (gauge)");
   }
   return {};
 }
 
-std::string PoseGraphOptions::Check() const {
-  if (max_num_iterations < 1) return "a pose graph needs at least one iteration";
-  if (!(function_tolerance >= 0.0)) return "function_tolerance must not be negative";
+Result<> PoseGraphOptions::Check() const {
+  if (max_num_iterations < 1) return Failed("a pose graph needs at least one iteration");
+  if (!(function_tolerance >= 0.0)) return Failed("function_tolerance must not be negative");
   if (!(translation_sigma > 0.0) || !(rotation_sigma_rad > 0.0) || !(log_scale_sigma > 0.0)) {
-    return "translation_sigma, rotation_sigma_rad and log_scale_sigma must be positive";
+    return Failed("translation_sigma, rotation_sigma_rad and log_scale_sigma must be positive");
   }
   return {};
 }
 
 std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& problem, const PoseGraphOptions& options) {
-  for (const std::string& sentence : {problem.Check(), options.Check()}) {
-    if (!sentence.empty()) throw std::invalid_argument("OptimizePoseGraph: " + sentence);
-  }
+  ThrowIfFailed<std::invalid_argument>(problem.Check(), "OptimizePoseGraph: ");
+  ThrowIfFailed<std::invalid_argument>(options.Check(), "OptimizePoseGraph: ");
   if (!IsFinite(problem)) return std::nullopt;
   return problem.has_scale ? PoseGraphSolver<7>(problem, options).Solve()
                            : PoseGraphSolver<6>(problem, options).Solve();

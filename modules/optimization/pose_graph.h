@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/ids.h"
+#include "core/result.h"
 #include "geometry/rigid3.h"
 
 namespace tessera {
@@ -33,8 +34,8 @@ struct PoseGraphProblem {
   std::vector<PoseGraphEdge> edges;
   bool has_scale = true;  // mono: Sim(3); false: SE(3), all scales stay as given, to the bit
 
-  // Empty if well formed, else one sentence: indices in range, a fixed node, positive weights, lengths and scales.
-  std::string Check() const;
+  // Fails unless indices are in range, a node is fixed, and weights, lengths and scales are positive.
+  Result<> Check() const;
 };
 
 struct PoseGraphOptions {
@@ -45,8 +46,8 @@ struct PoseGraphOptions {
   double rotation_sigma_rad = 0.001;
   double log_scale_sigma = 0.01;
 
-  // Empty if all is well, else one sentence that says what is out of range.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Minimizes over the free S = world_from_keyframe, in Ceres (sparse Cholesky),

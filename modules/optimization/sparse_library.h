@@ -5,9 +5,9 @@
 
 namespace tessera {
 
-// Eigen's, which adds up in the order of the matrix alone. CHOLMOD leaves large blocks to the BLAS of the machine;
-// ATLAS, for one, takes another way through a product where a block lies differently in memory, and with it the run
-// another result.
+// Eigen's, whose order of summation depends on the matrix alone. CHOLMOD leaves large blocks to the installed BLAS, and
+// some of these (ATLAS) sum in another order depending on the memory alignment of a block, which changes the result of
+// a run.
 inline constexpr ceres::SparseLinearAlgebraLibraryType kSparseLibrary = ceres::EIGEN_SPARSE;
 
 }  // namespace tessera
