@@ -107,11 +107,11 @@ std::vector<std::set<KeyframeId>> PlacesOf(const Map& map, const PlaceDatabase& 
 
 }  // namespace
 
-std::string CandidateOptions::Check() const {
+Result<> CandidateOptions::Check() const {
   if (min_shared_landmarks < 1 || num_neighbors < 1 || num_consistent < 0 || max_candidates < 1) {
-    return "the numbers of neighbors and candidates must be positive";
+    return Failed("the numbers of neighbors and candidates must be positive");
   }
-  return "";
+  return {};
 }
 
 Candidates FindLoopCandidates(const Map& map, const PlaceDatabase& places, KeyframeId id,

@@ -125,8 +125,7 @@ Result<> CheckConstraints(const BundleProblem& problem) {
 }
 
 Result<> CheckGauge(const BundleProblem& problem) {
-  const auto num_fixed =
-      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
+  const int num_fixed = problem.num_fixed_poses();
   if (num_fixed == 0) {
     return Failed("no pose is fixed; fix one at least (gauge)");
   }
@@ -137,9 +136,7 @@ Result<> CheckGauge(const BundleProblem& problem) {
       problem.poses[static_cast<size_t>(problem.scale_pose)].is_fixed) {
     return Failed("scale_pose must be the index of a free pose, or -1");
   }
-  const bool has_right = std::any_of(problem.observations.begin(), problem.observations.end(),
-                                     [](const BundleObservation& o) { return o.seen.has_right(); });
-  if (num_fixed > 1 || has_right || !problem.constraints.empty()) {
+  if (num_fixed > 1 || problem.has_right() || !problem.constraints.empty()) {
     return Failed(
         "scale_pose is for mono with one fixed pose and no constraints; all else fixes the scale, so set it to -1");
   }
@@ -171,6 +168,16 @@ std::optional<BundleResult> AdjustInRounds(const BundleProblem& problem, const B
 }
 
 }  // namespace
+
+int BundleProblem::num_fixed_poses() const {
+  return static_cast<int>(
+      std::count_if(poses.begin(), poses.end(), [](const BundlePose& pose) { return pose.is_fixed; }));
+}
+
+bool BundleProblem::has_right() const {
+  return std::any_of(observations.begin(), observations.end(),
+                     [](const BundleObservation& o) { return o.seen.has_right(); });
+}
 
 Result<> BundleProblem::Check() const {
   if (!(calibration.fx_px > 0.0) || !(calibration.fy_px > 0.0)) {
@@ -204,8 +211,7 @@ std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const Bun
   if (!IsFinite(problem)) {
     return std::nullopt;
   }
-  const auto num_free =
-      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return !pose.is_fixed; });
+  const int num_free = static_cast<int>(problem.poses.size()) - problem.num_fixed_poses();
   const bool is_window = num_free <= options.max_num_dense_poses && !options.is_always_ceres;
   std::optional<BundleResult> result =
       is_window ? AdjustInRounds<WindowSolver>(problem, options) : AdjustInRounds<BundleSolver>(problem, options);

@@ -50,6 +50,8 @@ struct BundleProblem {
   // since a second fixed pose, a right column or a constraint fixes the scale.
   int scale_pose = -1;
 
+  int num_fixed_poses() const;
+  bool has_right() const;  // whether an observation has a right column
   // Fails unless indices are in range, a pose is fixed, and a scale pose is given only where it makes sense.
   Result<> Check() const;
 };

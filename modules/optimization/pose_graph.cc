@@ -8,8 +8,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include "optimization/ceres_options.h"
 #include "optimization/pose_graph_costs.h"
-#include "optimization/sparse_library.h"
 
 namespace tessera {
 namespace {
@@ -54,21 +54,15 @@ std::vector<char> ConnectedToFixed(const PoseGraphProblem& problem) {
 }
 
 ceres::Solver::Options SolverOptions(const PoseGraphOptions& options) {
-  ceres::Solver::Options solver;
+  ceres::Solver::Options solver = CeresSolverOptions(options.max_num_iterations, options.function_tolerance);
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.sparse_linear_algebra_library_type = kSparseLibrary;
-  solver.max_num_iterations = options.max_num_iterations;
-  solver.function_tolerance = options.function_tolerance;
-  // Both depend on the map's unit.
+  // These two depend on the unit of the map.
   solver.gradient_tolerance = 0.0;
   solver.parameter_tolerance = 0.0;
   // The first steps are Gauss-Newton's. The error of a loop is spread by the slowest modes of a chain, whose curvature
   // is (length of the chain)^-2 of the diagonal: with Ceres' 1e4 damping would hold them for many steps, and 20
   // iterations end long before the minimum.
   solver.initial_trust_region_radius = 1e16;
-  solver.max_solver_time_in_seconds = 1e9;  // iterations bound it, never the clock: results must not depend on load
-  solver.num_threads = 1;
-  solver.logging_type = ceres::SILENT;
   return solver;
 }
 
@@ -93,11 +87,7 @@ class PoseGraphSolver {
 
   std::optional<std::vector<Sim3>> Solve() {
     NodeUpdater updater(nodes_);
-    ceres::Problem::Options problem_options;
-    problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    problem_options.evaluation_callback = &updater;
-    problem_options.disable_all_safety_checks = true;  // PoseGraphProblem::Check() made them
-    ceres::Problem ceres_problem(problem_options);
+    ceres::Problem ceres_problem(CeresProblemOptions(updater));
     if (!AddNodes(ceres_problem)) return std::nullopt;
     AddEdges(ceres_problem);
     ceres::Solver::Summary summary;
