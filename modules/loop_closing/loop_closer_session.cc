@@ -10,9 +10,9 @@ LoopCloserSession::LoopCloserSession(std::shared_ptr<const Vocabulary> vocabular
     : options_(options), loop_closer_(std::move(vocabulary), options.loop_closer) {}
 
 Result<> LoopCloserSession::Receive(const MapDelta& delta) {
-  const std::string problem = loop_closer_.ApplyDelta(delta);
-  has_map_ = problem.empty();
-  if (!has_map_) return Failed(problem);
+  const Result<> applied = loop_closer_.ApplyDelta(delta);
+  has_map_ = applied.has_value();
+  TESSERA_RETURN_IF_FAILED(applied);
   if (!options_.closes_loops) return {};
   const KeyframeId id = delta.answers;
   // The session that found the loop knows; one that was started again since does not.

@@ -6,20 +6,21 @@
 
 namespace tessera {
 
-std::string MapperSessionOptions::Check() const {
+Result<> MapperSessionOptions::Check() const {
   // A loop closer that is started again finds the keyframe in the last snapshot but one.
   if (delays.loop_keyframes < 1 || delays.loop_keyframes >= MapArchive::kSnapshotInterval) {
-    return "a loop must be applied 1 to " + std::to_string(MapArchive::kSnapshotInterval - 1) + " keyframes later";
+    return Failed("a loop must be applied 1 to " + std::to_string(MapArchive::kSnapshotInterval - 1) +
+                  " keyframes later");
   }
   if (delays.adjustment_keyframes < 1 || delays.adjustment_growth < 1) {
-    return "a global adjustment must be applied at least one keyframe later";
+    return Failed("a global adjustment must be applied at least one keyframe later");
   }
   return mapper.Check();
 }
 
 MapperSession::MapperSession(const MapperSessionOptions& options)
     : options_(options), mapper_(options.mapper), schedule_(options.delays) {
-  if (const std::string problem = options.Check(); !problem.empty()) throw std::invalid_argument(problem);
+  ThrowIfFailed<std::invalid_argument>(options.Check());
 }
 
 MapperSession::State MapperSession::state() const {
@@ -34,7 +35,7 @@ MapperSession::State MapperSession::state() const {
 }
 
 Result<MapperActions> MapperSession::Load(const MapDelta& snapshot) {
-  if (const std::string problem = mapper_.Load(snapshot); !problem.empty()) return Failed(problem);
+  TESSERA_RETURN_IF_FAILED(mapper_.Load(snapshot));
   archive_.Begin(map());
   places_.Begin(map());
   next_keyframe_ = {map().answered().value + 1};

@@ -36,7 +36,7 @@ struct MapperSessionOptions {
   bool closes_loops = true;  // false: no keyframe waits for loop results
 
   // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 // Values are to be published.

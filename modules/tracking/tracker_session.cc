@@ -29,9 +29,9 @@ Result<> TrackerSession::Receive(TrackerTime::Delta delta) {
     time_->Receive(std::move(delta));
     return {};
   }
-  const std::string problem = tracker_.ApplyDelta(*delta);
-  awaits_snapshot_ = !problem.empty();
-  if (awaits_snapshot_) return Failed(problem);
+  const Result<> applied = tracker_.ApplyDelta(*delta);
+  awaits_snapshot_ = !applied;
+  TESSERA_RETURN_IF_FAILED(applied);
   time_->SkipTo(*delta);
   return {};
 }

@@ -18,7 +18,7 @@ LoopCloserSessionOptions OptionsFrom(const Settings& settings) {
   options.relocalization.min_seen = settings.Get<int>("loop_closer.min_relocalized");
   options.verification.min_coverage = options.relocalization.min_coverage =
       settings.Get<double>("loop_closer.min_coverage");
-  if (const std::string problem = options.Check(); !problem.empty()) throw InputError("loop_closer: " + problem);
+  ThrowIfFailed<InputError>(options.Check(), "loop_closer: ");
   result.closes_loops = settings.Get<bool>("mapper.close_loops");
   result.loop_delay_keyframes = settings.Get<int>("mapper.loop_delay_keyframes");
   return result;

@@ -29,7 +29,7 @@ MapperSessionOptions OptionsFrom(const Settings& settings) {
                    settings.Get<int>("mapper.adjustment_delay_keyframes"),
                    settings.Get<int>("mapper.adjustment_delay_growth")};
   result.closes_loops = settings.Get<bool>("mapper.close_loops");
-  if (const std::string problem = result.Check(); !problem.empty()) throw InputError("mapper: " + problem);
+  ThrowIfFailed<InputError>(result.Check(), "mapper: ");
   return result;
 }
 
