@@ -47,6 +47,7 @@ make_tar() {
   local folder
   mkdir -p "$store"
   folder="$(mktemp -d "$store/new-$suite.XXXX")"
+  chmod 755 "$folder"
   debootstrap --variant=minbase --include=sudo,ca-certificates "$suite" "$folder" >"$store/$suite.log" 2>&1 ||
     fail "debootstrap failed; its output is in $store/$suite.log and $folder/debootstrap."
   chroot "$folder" useradd --create-home --shell /bin/bash "$user"

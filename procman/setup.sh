@@ -72,7 +72,7 @@ check_machine() {
     *) fail "this CPU is $(uname -m); Tessera is built for x86-64 and aarch64." ;;
   esac
   command -v apt-get >/dev/null && command -v dpkg-query >/dev/null ||
-    fail "this system has no apt-get; Tessera is set up on Debian 12 or Ubuntu 24.04."
+    fail "this system has no apt-get; Tessera is set up on Debian 12 or 13."
 }
 
 missing_packages() {
@@ -171,8 +171,9 @@ num_build_jobs() {
 build() {
   # Brought whole by `tessera deploy --built`; a deploy of sources takes the mark away.
   [ ! -f "$root/build/.prebuilt" ] || return 0
-  local stamp_file="$root/build/.tessera-stamp" wanted have="" status=0
-  wanted="$(<"$root/.venv/.tessera-stamp")"
+  # Warnings are errors for continuous integration alone: the compiler of a user may warn of more than ours.
+  local stamp_file="$root/build/.tessera-stamp" wanted have="" status=0 warnings_are_errors="${TESSERA_WERROR:-OFF}"
+  wanted="$(<"$root/.venv/.tessera-stamp") $warnings_are_errors"
   [ ! -f "$stamp_file" ] || have="$(<"$stamp_file")"
   export CCACHE_SLOPPINESS=pch_defines,time_macros
   if [ "$have" != "$wanted" ]; then
@@ -180,7 +181,7 @@ build() {
     rm -rf "$root/build/CMakeCache.txt" "$root/build/CMakeFiles"
     say "Configuring the build in build/"
     log_step "CMake could not configure the build." cmake -S "$root" -B "$root/build" -G Ninja \
-      -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER_LAUNCHER=ccache
+      -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_COMPILE_WARNING_AS_ERROR="$warnings_are_errors"
     printf '%s\n' "$wanted" >"$stamp_file"
   fi
   printf '\n== ninja\n' >>"$setup_log"

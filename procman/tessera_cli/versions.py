@@ -12,7 +12,9 @@ from tessera_cli.files import BUILD, ROOT
 
 def collect_versions() -> dict[str, str]:
     """Names and versions, in the order in which to show them. What can't be found out is left out."""
-    versions = {"Tessera": _commit(), **_of_build(BUILD / "versions.json"), "Python": platform.python_version(),
+    built = _of_build(BUILD / "versions.json")
+    commit = _commit()
+    versions = {"Tessera": built.pop("Tessera", "") + (f", commit {commit}" if commit else ""), **built, "Python": platform.python_version(),
                 "system": f"{_system()}, Linux {platform.release()}", "CPU": f"{_cpu()}, {os.cpu_count()} cores",
                 "date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}"}
     return {name: version for name, version in versions.items() if version}
