@@ -16,7 +16,7 @@ struct LocalWindowOptions {
   bool is_double = false;
 
   // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 struct LocalWindow {

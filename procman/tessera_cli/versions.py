@@ -21,9 +21,8 @@ def tessera_version() -> str:
 def collect_versions() -> dict[str, str]:
     """Names and versions, in the order in which to show them. What is unknown is left out."""
     commit = _commit()
-    versions = {
+    versions = _of_build(BUILD / "versions.json") | {
         "Tessera": tessera_version() + (f", commit {commit}" if commit else ""),
-        **_of_build(BUILD / "versions.json"),
         "Python": platform.python_version(),
         "system": f"{_system()}, Linux {platform.release()}",
         "CPU": f"{_cpu()}, {os.cpu_count()} cores",
