@@ -121,7 +121,7 @@ class PoseGraphSolver {
     }
   }
 
-  std::optional<std::vector<Sim3>> Result() {
+  std::optional<std::vector<Sim3>> Solution() {
     std::vector<Sim3> result;
     for (size_t i = 0; i < nodes_.size(); ++i) {
       nodes_[i].Update();
