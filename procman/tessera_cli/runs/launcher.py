@@ -27,6 +27,7 @@ from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import read_process_list
 from tessera_cli.supervision.stack_monitor import StackMonitor
 from tessera_cli.supervision.state_folder import LogFolder
+from tessera_cli.versions import tessera_version
 
 PROCESS_LIST = PROCMAN / "local.pmd"
 # Stages whose long steps frames may have to wait for.
@@ -82,10 +83,11 @@ class Launcher:
         """The exit status. All processes have ended when it returns or raises."""
         arguments = self._arguments
         stack = f"{arguments.sensor}, {arguments.extractors} extractors, {arguments.tiles} tiles"
+        title = f"version {tessera_version()}: {self._source.name}, {stack}"
         ended = "complete"
         began = time.monotonic()
         try:
-            with make_run_view(f"{self._source.name}, {stack}") as view:
+            with make_run_view(title) as view:
                 self._start(view)
                 began = time.monotonic()
                 ended = self._watch(view)

@@ -38,6 +38,7 @@ from tessera_cli.supervision.running_list import RunningList, listen_to
 from tessera_cli.supervision.state_folder import StateFolder
 from tessera_cli.supervision.supervisor import Supervisor
 from tessera_cli.supervision.wishes import run_of, to_launch
+from tessera_cli.versions import tessera_version
 
 
 def run_deputy(arguments: Namespace) -> int:
@@ -81,7 +82,8 @@ class Deputy:
         self._look_for_duplicates()
         self._bus.subscribe(PROCMAN_ORDER, None, self._on_order)
         guard = Guard(self._folder.mark())
-        say(f"deputy {self._id} on {self._bus.url}; logs in {self._folder.path / 'logs'}")
+        logs = self._folder.path / "logs"
+        say(f"deputy {self._id} of version {tessera_version()} on {self._bus.url}; logs in {logs}")
         if resumes:
             self._resume()
         while not interrupt.requested:

@@ -117,7 +117,7 @@ def test_one_that_always_dies_is_tried_with_longer_waits_and_then_given_up(make_
         "--script",
         "s",
     )
-    assert up.returncode == 1 and "died 7 times in a row" in up.stderr and "list.pmd:2" in up.stderr
+    assert up.returncode == 1 and "ended 7 times in a row" in up.stderr and "list.pmd:2" in up.stderr
 
 
 def test_more_memory_than_allowed_ends_it(make_node: MakeNode) -> None:
@@ -177,9 +177,9 @@ def test_bad_settings_are_refused_before_anything_starts(make_node: MakeNode) ->
 def test_a_host_without_a_deputy_and_a_second_deputy_with_one_id_are_told(make_node: MakeNode) -> None:
     node = make_node(COMMANDS).start()
     up = node.up(listed("sleeper", host="node7"))
-    assert up.returncode == 2 and "no deputy answers for node7; there is: node1" in up.stderr
+    assert up.returncode == 2 and "no deputy answers for node7; known: node1" in up.stderr
     finished = node.command("deputy", "--id", "node1", "--folder", node.folder / "other")
-    assert finished.returncode == 2 and "a deputy with the id node1 runs on" in finished.stderr
+    assert finished.returncode == 2 and "a deputy with the id node1 already runs on" in finished.stderr
     same = node.command("deputy", "--id", "node1", "--folder", node.folder / "state")
     assert same.returncode == 2 and "runs on this machine already" in same.stderr
 

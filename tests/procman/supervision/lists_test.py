@@ -128,7 +128,7 @@ def test_names_that_can_be_none_of_a_list_and_lists_that_are_not_there_are_told(
         assert up.returncode == 2 and "--name NAME" in up.stderr
     assert node.up(listed("sleeper"), name="robot_a").returncode == 0
     down = node.command("down", "robot_c")
-    assert down.returncode == 2 and "no deputy has a list 'robot_c'; there is: robot_a" in down.stderr
+    assert down.returncode == 2 and "no deputy has a list 'robot_c'; known: robot_a" in down.stderr
 
 
 def test_a_list_that_ended_is_forgotten_with_the_next_order(make_node: MakeNode) -> None:

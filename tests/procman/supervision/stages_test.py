@@ -87,7 +87,7 @@ def test_a_stage_that_says_nothing_hangs_and_is_started_again(make_node: MakeNod
         lambda: node.processes()["extractor"]["starts"] == 2 and node.processes()["extractor"]["state"] == "ready",
         "its return",
     )
-    assert node.processes()["extractor"]["reason"] == "said nothing for 2 s"
+    assert node.processes()["extractor"]["reason"] == "sent no status for 2 s"
 
 
 def test_a_stage_that_cannot_become_ready_is_told_with_its_reason(make_node: MakeNode) -> None:
