@@ -49,7 +49,9 @@ bool BeginsWithMap(const Settings& settings) { return !settings.Get<std::string>
 TrackerStage::TrackerStage(StageContext& context)
     : context_(context),
       session_(OptionsFrom(context.settings()), TimeFrom(context.settings()), BeginsWithMap(context.settings())),
-      map_(context, BeginsWithMap(context.settings()), [this] { OnDeltas(); }) {
+      map_(
+          context, BeginsWithMap(context.settings()),
+          [this](const MapFollower::Delta& delta) { return session_.Receive(delta); }, [this] { Advance(); }) {
   poses_ = context.Advertise(kPose);
   keyframes_ = context.Advertise(kKeyframe);
   end_of_stream_ = context.Advertise(kEndOfStream);
@@ -68,13 +70,6 @@ TrackerStage::TrackerStage(StageContext& context)
   context.Every(kAskAgain, [this] {
     if (const auto* question = session_.open_question()) requests_.Publish(*question);
   });
-}
-
-void TrackerStage::OnDeltas() {
-  for (const auto& delta : map_.Take()) {
-    if (const auto received = session_.Receive(delta); !received) map_.Reject(received.error().sentence);
-  }
-  Advance();
 }
 
 // Tracks what can be tracked, and measures how long the first frame waits for what it must see.

@@ -17,7 +17,6 @@ class TrackerStage {
   explicit TrackerStage(StageContext& context);
 
  private:
-  void OnDeltas();
   void Advance();
   void Do(const TrackerActions& actions);
   void Publish(const PoseEstimate& pose);
