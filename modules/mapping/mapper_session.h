@@ -40,8 +40,8 @@ struct MapperSessionOptions {
 };
 
 // Values are to be published.
-using MapperAction = std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, Fail,
-                                  Finish>;
+using MapperAction =
+    std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, Fail, Finish>;
 using MapperActions = std::vector<MapperAction>;
 
 class MapperSession {
