@@ -17,7 +17,7 @@ namespace tessera {
 
 struct LoopCloserSessionOptions {
   LoopCloserOptions loop_closer;
-  bool closes_loops = true;         // false: only questions are answered
+  bool closes_loops = true;          // false: only questions are answered
   int64_t loop_delay_keyframes = 6;  // the mapper applies a loop so many keyframes later
 };
 

@@ -97,8 +97,8 @@ MapperActions MapperSession::Advance() {
 
 MapperActions MapperSession::Process() {
   const KeyframeObservation& keyframe = waiting_.front();
-  MapperActions actions = Publish(
-      mapper_.Process(keyframe, options_.closes_loops ? schedule_.Take(keyframe.id) : DueCorrections{}));
+  MapperActions actions =
+      Publish(mapper_.Process(keyframe, options_.closes_loops ? schedule_.Take(keyframe.id) : DueCorrections{}));
   waiting_.pop_front();
   ++num_processed_;
   return actions;

@@ -35,13 +35,12 @@ struct MapperSessionOptions {
   CorrectionDelays delays;
   bool closes_loops = true;  // false: no keyframe waits for loop results
 
-  // Empty if all is well, else one sentence.
   Result<> Check() const;
 };
 
 // Values are to be published.
-using MapperAction = std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, Fail,
-                                  Finish>;
+using MapperAction =
+    std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, Fail, Finish>;
 using MapperActions = std::vector<MapperAction>;
 
 class MapperSession {

@@ -31,12 +31,14 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply a
 }
 
 void MapSubscription::FollowToEnd() {
-  context_.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
-    if (end.stage != StageKind::kMapper) return;
-    mapper_end_ = end;
-    follower_.Expect(end.num_values);
-    on_news_();
-  });
+  context_.Subscribe(kEndOfStream, [this](const EndOfStream& end) { Receive(end); });
+}
+
+void MapSubscription::Receive(const EndOfStream& end) {
+  if (end.stage != StageKind::kMapper) return;
+  mapper_end_ = end;
+  follower_.Expect(end.num_values);
+  on_news_();
 }
 
 void MapSubscription::ApplyAll() {

@@ -25,11 +25,12 @@ class MapSubscription {
 
   // The mapper's end is of interest: the last deltas are asked for if they do not come.
   void FollowToEnd();
-  // The mapper has ended, and all its deltas were applied; only after FollowToEnd().
+  // The same for a stage that listens to END_OF_STREAM itself. Ends of other stages change nothing.
+  void Receive(const EndOfStream& end);
+  // The mapper has ended, and all its deltas were applied.
   bool is_complete() const {
     return mapper_end_ && !follower_.needs_snapshot() && follower_.next_delta() >= mapper_end_->num_values;
   }
-  const std::optional<EndOfStream>& mapper_end() const { return mapper_end_; }
 
   // A delta that Apply took did not fit after all, for this reason: it is reported, and a snapshot is asked for.
   void Reject(const std::string& reason);
