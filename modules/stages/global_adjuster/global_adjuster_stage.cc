@@ -11,7 +11,7 @@ namespace {
 BundleOptions OptionsFrom(const Settings& settings) {
   BundleOptions options = GlobalBundleOptions();
   options.max_num_iterations = settings.Get<int>("global_adjuster.iterations");
-  if (const std::string problem = options.Check(); !problem.empty()) throw InputError("global_adjuster: " + problem);
+  ThrowIfFailed<InputError>(options.Check(), "global_adjuster: ");
   return options;
 }
 

@@ -16,7 +16,7 @@ LoopCloserOptions OptionsFrom(const Settings& settings) {
   options.relocalization.min_seen = settings.Get<int>("loop_closer.min_relocalized");
   options.verification.min_coverage = options.relocalization.min_coverage =
       settings.Get<double>("loop_closer.min_coverage");
-  if (const std::string problem = options.Check(); !problem.empty()) throw InputError("loop_closer: " + problem);
+  ThrowIfFailed<InputError>(options.Check(), "loop_closer: ");
   return options;
 }
 

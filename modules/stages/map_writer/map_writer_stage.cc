@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "evaluation/map_text.h"
-#include "evaluation/run_files.h"
 
 namespace tessera {
 namespace {

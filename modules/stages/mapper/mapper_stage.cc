@@ -24,9 +24,7 @@ MapperOptions OptionsFrom(const Settings& settings) {
   options.bundle.is_always_ceres = settings.Get<bool>("mapper.always_ceres");
   options.bundle.max_num_iterations = settings.Get<int>("mapper.bundle_iterations");
   options.keyframe_culling.redundant_share = settings.Get<double>("mapper.redundant_share");
-  if (const std::string problem = options.Check(); !problem.empty()) {
-    throw InputError("mapper: " + problem);
-  }
+  ThrowIfFailed<InputError>(options.Check(), "mapper: ");
   return options;
 }
 
