@@ -56,7 +56,7 @@ class RunRecord {
  public:
   // A frame counts once: the first pose.
   void AddPose(const PoseEstimate& pose, int64_t publish_us);
-  // The next change of the map. Returns Map::Apply's sentence.
+  // The next change of the map; fails as Map::Apply does.
   Result<> ApplyDelta(const MapDelta& delta);
   // Keyframes removed from the map, also before the first change received.
   void AddRemoved(const RemovedInDelta& removed);

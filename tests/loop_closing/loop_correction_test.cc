@@ -107,7 +107,7 @@ TEST(LoopCorrection, JoinsTwoParts) {
     const auto pose = [](int64_t k) {
       return Rigid3{ExpSO3({0.0, 0.1 * static_cast<double>(k), 0.0}), {0.0, 0.0, static_cast<double>(k)}};
     };
-    // 0 <- 1 <- 4 <- 5, and 2 <- 3: the older part was gone on with.
+    // 0 <- 1 <- 4 <- 5, and 2 <- 3: the older part was continued.
     const std::vector<int64_t> parents{-1, 0, -1, 2, 1, 4};
     for (int64_t k = 0; k < 6; ++k) {
       editor.AddKeyframe({k}, {parents[static_cast<size_t>(k)]}, Sim3::From(pose(k)), FeaturesOf(k, SensorType::kMono));
