@@ -214,7 +214,7 @@ TEST(Relocalization, ALoadedMapIsContinued) {
   KeyframeId last;
   const MapDelta made = MadeMap(&last);
   Carried run;
-  ASSERT_EQ(run.mapper.Load(made), "");
+  ASSERT_THAT(run.mapper.Load(made), IsSuccess());
   run.Apply(made);
   EXPECT_EQ(run.tracker.last_keyframe(), last);
   const FeatureFrame features = run.Take(15);
