@@ -40,7 +40,8 @@ TEST(GlobalAdjustment, BringsADeformedMapNearerToTheTruth) {
     std::map<LandmarkId, Landmark> moved;
     map.landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
       moved[id] = landmark;
-      moved[id].position_in_world = Deformation(map.ObservationsOf(id).front().keyframe.value) * landmark.position_in_world;
+      moved[id].position_in_world =
+          Deformation(map.ObservationsOf(id).front().keyframe.value) * landmark.position_in_world;
     });
     for (const auto& [id, landmark] : moved) editor.ChangeLandmark(id, landmark);
     (void)editor.Finish({19});

@@ -151,8 +151,9 @@ TEST_F(LocalAdjustment, LandmarksLeftWithOneObservationGoAndThoseOfASingleKeyfra
   const Rigid3 before = map().FindKeyframe({9})->world_from_camera;
   const Eigen::Vector3d in_camera = before.Inverse() * map().FindLandmark(own)->position_in_world;
   const size_t num_in_map = map().ObservationsOf(problem.points[0].id).size();
-  const size_t num_in_problem = static_cast<size_t>(std::count_if(
-      problem.observations.begin(), problem.observations.end(), [](const BundleObservation& o) { return o.point == 0; }));
+  const size_t num_in_problem =
+      static_cast<size_t>(std::count_if(problem.observations.begin(), problem.observations.end(),
+                                        [](const BundleObservation& o) { return o.point == 0; }));
   Change([&](MapEditor& editor) { WriteBack(problem, result, editor); });
   const Rigid3& after = map().FindKeyframe({9})->world_from_camera;
   EXPECT_THAT(after.Inverse(), IsNear(result.camera_from_world[newest], 1e-12));
