@@ -14,34 +14,25 @@ namespace {
 // How exactly timed frames leave; small against the time between two images of any camera.
 constexpr std::chrono::milliseconds kTick{2};
 
-SourceOptions SourceOptionsFrom(const Settings& settings) {
-  SourceOptions options;
-  options.source = settings.Get<std::string>("camera.source");
-  options.sensor = ParseSensor(settings.Get<std::string>("camera.sensor"));
-  options.calibration_path = settings.Get<std::string>("camera.calibration");
-  options.depth_unit_m = settings.Get<double>("camera.depth_unit_m");
-  options.first_frame = settings.Get<int>("camera.first_frame");
-  options.last_frame = settings.Get<int>("camera.last_frame");
-  if (options.depth_unit_m < 0.0) {
-    throw InputError("camera.depth_unit_m must not be negative; 0 takes what the source says");
-  }
-  return options;
-}
-
 std::unique_ptr<FrameSource> Open(const Settings& settings) {
-  const SourceOptions options = SourceOptionsFrom(settings);
-  return options.source.starts_with("log:") ? OpenLog(options, settings.Get<std::string>("bus.channel_prefix"))
+  const auto camera = settings.Get<CameraSettings>();
+  SourceOptions options;
+  options.source = camera.source;
+  options.sensor = ParseSensor(camera.sensor);
+  options.calibration_path = camera.calibration;
+  options.depth_unit_m = camera.depth_unit_m;
+  options.first_frame = camera.first_frame;
+  options.last_frame = camera.last_frame;
+  return options.source.starts_with("log:") ? OpenLog(options, settings.Get<BusSettings>().channel_prefix)
                                             : OpenSource(options);
 }
 
 PacerOptions PacerOptionsFrom(const Settings& settings, bool is_live) {
-  PacerOptions options = ParsePace(settings.Get<std::string>("camera.pace"));
-  options.lockstep_window = settings.Get<int>("camera.lockstep_window");
-  if (options.lockstep_window < 1) {
-    throw InputError("camera.lockstep_window must be at least 1");
-  }
+  const auto camera = settings.Get<CameraSettings>();
+  PacerOptions options = ParsePace(camera.pace);
+  options.lockstep_window = camera.lockstep_window;
   // Nothing answers from a log that is being written.
-  if (is_live || settings.Get<std::string>("bus.main_url").starts_with("file:")) {
+  if (is_live || settings.Get<BusSettings>().main_url.starts_with("file:")) {
     options.kind = PacerOptions::Kind::kFree;
   }
   return options;
@@ -49,7 +40,8 @@ PacerOptions PacerOptionsFrom(const Settings& settings, bool is_live) {
 
 // Frames that the dispatcher can have taken, beyond the last one tracked.
 int64_t NumOnTheWay(const Settings& settings) {
-  return settings.Get<int>("dispatcher.max_queued_frames") + settings.Get<int>("dispatcher.max_frames_in_flight");
+  const auto dispatcher = settings.Get<DispatcherSettings>();
+  return dispatcher.max_queued_frames + dispatcher.max_frames_in_flight;
 }
 
 CameraSession MakeSession(const StageContext& context) {
