@@ -6,6 +6,7 @@
 #include <tuple>
 #include <vector>
 
+#include "features/feature_types.h"
 #include "map/map_archive.h"
 #include "messages/topics.h"
 
@@ -126,10 +127,9 @@ struct FeaturesSettings {
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
-    // As FeatureOptions::Check(), which checks what comes over the network.
-    field("num_features", self.num_features, Range{1, 50'000, "keypoints"});
-    field("min_score", self.min_score, Range{1, 254});
-    field("max_disparity_px", self.max_disparity_px, Range{1, 1024, "px"});
+    field("num_features", self.num_features, Range{1, FeatureOptions::kMaxFeatures, "keypoints"});
+    field("min_score", self.min_score, Range{1, FeatureOptions::kMaxScore});
+    field("max_disparity_px", self.max_disparity_px, Range{1, FeatureOptions::kMaxDisparityPx, "px"});
   }
 };
 

@@ -61,22 +61,5 @@ TEST(DefaultSettings, OfExtractionAndItsDistribution) {
   EXPECT_EQ(Defaults<CameraSettings>().lockstep_window, PacerOptions{}.lockstep_window);
 }
 
-TEST(SettingRanges, OfFeaturesAreTheExtractors) {
-  FeaturesSettings section;
-  FeaturesSettings::Visit(section, [](const std::string& name, int&, const Range& range) {
-    const auto problem = [&name](double value) {
-      FeatureOptions options;
-      (name == "num_features" ? options.num_features
-       : name == "min_score"  ? options.min_score
-                              : options.max_disparity_px) = static_cast<int>(value);
-      return options.Check();
-    };
-    EXPECT_EQ(problem(range.lowest), "");
-    EXPECT_EQ(problem(range.highest), "");
-    EXPECT_NE(problem(range.lowest - 1), "") << name;
-    EXPECT_NE(problem(range.highest + 1), "") << name;
-  });
-}
-
 }  // namespace
 }  // namespace tessera
