@@ -14,11 +14,11 @@ size_t NumPixels(const TileJob& job) {
 }  // namespace
 
 Result<> WorkQueueOptions::Check() const {
-  if (max_queued_frames < 1) return Failed("dispatcher.max_queued_frames must be at least 1");
-  if (max_frames_in_flight < 1) return Failed("dispatcher.max_frames_in_flight must be at least 1");
-  if (jobs_per_extractor < 1) return Failed("dispatcher.jobs_per_extractor must be at least 1");
-  if (coarse_levels_from < 1) return Failed("dispatcher.coarse_levels_from must be at least 1");
-  if (late_us <= 0 || silent_us <= 0) return Failed("dispatcher.late_ms and dispatcher.silent_ms must be positive");
+  if (max_queued_frames < 1) return Failed("at least one frame must fit the queue");
+  if (max_frames_in_flight < 1) return Failed("at least one frame must be in flight");
+  if (jobs_per_extractor < 1) return Failed("an extractor must get at least one job");
+  if (coarse_levels_from < 1) return Failed("level 0 must be cut");
+  if (late_us <= 0 || silent_us <= 0) return Failed("times after which jobs are late and extractors dead must be positive");
   return features.Check();
 }
 

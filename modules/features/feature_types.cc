@@ -13,10 +13,10 @@ Result<> CheckRange(const char* name, int value, int lowest, int highest) {
 }  // namespace
 
 Result<> FeatureOptions::Check() const {
-  TESSERA_RETURN_IF_FAILED(CheckRange("num_features", num_features, 1, 50000));
+  TESSERA_RETURN_IF_FAILED(CheckRange("num_features", num_features, 1, kMaxFeatures));
   TESSERA_RETURN_IF_FAILED(CheckRange("num_levels", num_levels, 1, kMaxLevels));
-  TESSERA_RETURN_IF_FAILED(CheckRange("min_score", min_score, 1, 254));
-  return CheckRange("max_disparity_px", max_disparity_px, 1, 1024);
+  TESSERA_RETURN_IF_FAILED(CheckRange("min_score", min_score, 1, kMaxScore));
+  return CheckRange("max_disparity_px", max_disparity_px, 1, kMaxDisparityPx);
 }
 
 }  // namespace tessera

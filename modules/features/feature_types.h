@@ -15,21 +15,24 @@
 namespace tessera {
 
 inline constexpr int kMaxLevels = 12;  // of a pyramid: 1.2^11 = 7.4
+inline constexpr int kNumLevels = 8;   // of the pyramids that maps are made from
+inline constexpr int kTopLevel = kNumLevels - 1;
 
 // What decides the features of an image. Carried in every job, so that all extractors of a pool, and several robots
 // that share it, need no configuration of their own.
 struct FeatureOptions {
-  int num_features = 2000;     // keypoints per image after selection
-  int num_levels = 8;          // pyramid levels; each is 5/6 of the one below in both directions (scale 1.2)
-  int min_score = 7;           // lowest corner score (FAST: intensity difference, 0..255) that counts
-  int max_disparity_px = 128;  // stereo: widest search along the row, in level-0 pixels
+  static constexpr int kMaxFeatures = 50000;
+  static constexpr int kMaxScore = 254;
+  static constexpr int kMaxDisparityPx = 1024;
+
+  int num_features = 2000;      // keypoints per image after selection
+  int num_levels = kNumLevels;  // pyramid levels; each is 5/6 of the one below in both directions (scale 1.2)
+  int min_score = 7;            // lowest corner score (FAST: intensity difference, 0..255) that counts
+  int max_disparity_px = 128;   // stereo: widest search along the row, in level-0 pixels
 
   bool operator==(const FeatureOptions&) const = default;
   Result<> Check() const;
 };
-
-// The coarsest level of the pyramids that maps are made from.
-inline constexpr int kTopLevel = FeatureOptions{}.num_levels - 1;
 
 using Descriptor = std::array<uint64_t, 4>;  // 256 binary tests; compare by Hamming distance
 

@@ -32,9 +32,9 @@ std::vector<KeyframeId> BestOutsiders(const Map& map, const std::vector<Keyframe
 }  // namespace
 
 Result<> LocalWindowOptions::Check() const {
-  if (max_inner_keyframes < 2) return Failed("mapper.max_inner_keyframes must be at least 2");
-  if (min_shared_landmarks < 1) return Failed("mapper.min_shared_landmarks must be at least 1");
-  if (max_outer_keyframes < 1) return Failed("mapper.max_outer_keyframes must be at least 1");
+  if (max_inner_keyframes < 2) return Failed("max_inner_keyframes must be at least 2");
+  if (min_shared_landmarks < 1) return Failed("min_shared_landmarks must be at least 1");
+  if (max_outer_keyframes < 1) return Failed("max_outer_keyframes must be at least 1");
   return {};
 }
 

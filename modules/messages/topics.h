@@ -86,8 +86,8 @@ inline const Topic<StageStatus> kStatus{"STATUS", BusKind::kMain, Delivery::kUno
 inline const Topic<Heartbeat> kHeartbeat{"HEARTBEAT", BusKind::kMain, Delivery::kUnordered, Publishers::kMany};
 inline const Topic<RepairRequest> kRepair{"REPAIR", BusKind::kMain, Delivery::kUnordered, Publishers::kMany};
 
-inline constexpr int kMaxRobots = 64;        // that share one extractor
-inline constexpr int kMaxExtractors = 1024;  // ids are 0 .. kMaxExtractors - 1: each has a port of its own
+inline constexpr int kMaxRobots = 64;       // that share one extractor
+inline constexpr int kMaxExtractors = 256;  // ids are 0 .. kMaxExtractors - 1: each has a port of its own
 
 // The jobs of one extractor. Those of an extractor that died are given to others: its successor must not repeat them.
 inline Topic<TileJob> TileTopic(int extractor) {

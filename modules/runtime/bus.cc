@@ -45,18 +45,19 @@ std::shared_ptr<Bus> OpenBus(const std::string& url, int receive_buffer_bytes) {
 }
 
 std::string UrlOf(const Channel& channel, const Settings& settings) {
+  const auto bus = settings.Get<BusSettings>();
   switch (channel.bus) {
     case BusKind::kMain:
-      return settings.Get<std::string>("bus.main_url");
+      return bus.main_url;
     case BusKind::kCamera:
-      return settings.Get<std::string>("bus.camera_url");
+      return bus.camera_url;
     case BusKind::kWork:
-      return settings.Get<std::string>("bus.work_url");
+      return bus.work_url;
     case BusKind::kTile:
       break;
   }
-  std::string url = settings.Get<std::string>("bus.tile_url");
-  const int port = settings.Get<int>("bus.first_tile_port") + channel.extractor;
+  std::string url = bus.tile_url;
+  const int port = bus.first_tile_port + channel.extractor;
   if (channel.extractor < 0 || channel.extractor >= kMaxExtractors) {
     throw std::invalid_argument("extractor " + std::to_string(channel.extractor) + " has no bus: ids are 0 to " +
                                 std::to_string(kMaxExtractors - 1));

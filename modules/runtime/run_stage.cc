@@ -73,9 +73,10 @@ void CheckCpu() {
 }
 
 void CheckReceiveBuffer(const Settings& settings) {
-  const int asked = settings.Get<int>("bus.receive_buffer_bytes");
+  const auto bus = settings.Get<BusSettings>();
+  const int asked = bus.receive_buffer_bytes;
   const int granted = GrantedReceiveBuffer(asked);
-  if (settings.Get<std::string>("bus.main_url").starts_with("udpm:") && granted < asked) {
+  if (bus.main_url.starts_with("udpm:") && granted < asked) {
     spdlog::warn(
         "the kernel grants a receive buffer of {} bytes where {} are asked for; bursts will have to be sent "
         "again. Raise it: sudo sysctl -w net.core.rmem_max={}",
@@ -98,7 +99,7 @@ StageEngine::Setup MakeSetup(const Arguments& arguments) {
                     .epoch_us = setup.clock->WallUs(),
                     .host = HostName(),
                     .pid = static_cast<int32_t>(getpid())};
-  const int buffer_bytes = setup.settings.Get<int>("bus.receive_buffer_bytes");
+  const int buffer_bytes = setup.settings.Get<BusSettings>().receive_buffer_bytes;
   setup.open_bus = [buffer_bytes](const std::string& url) { return OpenBus(url, buffer_bytes); };
   setup.log = [](bool is_error, const std::string& sentence) {
     spdlog::log(is_error ? spdlog::level::err : spdlog::level::info, "{}", sentence);

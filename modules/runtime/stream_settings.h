@@ -1,4 +1,4 @@
-// The settings `bus.*` and `stream.*`, checked.
+// What the settings `bus.*` and `stream.*` mean for streams.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,6 @@ struct StreamSettings {
   int64_t heartbeat_us = 0;
   StreamReceiverOptions receiver;
 
-  // Throws InputError if a value is out of range.
   static StreamSettings From(const Settings& settings);
 };
 

@@ -2,50 +2,109 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
+#include <optional>
+#include <sstream>
+#include <type_traits>
+#include <variant>
 
 #include "core/errors.h"
 
 namespace tessera {
 namespace {
 
-// The type of a value, told from its text: an override must not change it.
-enum class Kind { kBool, kInteger, kReal, kText };
+enum class Kind { kBool, kWhole, kReal, kText };
+
+// What a value must be.
+struct Rule {
+  Kind kind = Kind::kText;
+  std::variant<std::monostate, Range, OneOf, Like> limits;
+};
 
 template <class Number>
-bool ParsesAs(const std::string& text) {
+std::optional<Number> Parse(const std::string& text) {
   Number number{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return !text.empty() && error == std::errc() && end == text.data() + text.size();
+  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
 }
 
-Kind KindOf(const std::string& text) {
-  if (text == "true" || text == "false") return Kind::kBool;
-  if (ParsesAs<long long>(text)) return Kind::kInteger;
-  if (ParsesAs<double>(text)) return Kind::kReal;
-  return Kind::kText;
+bool IsIn(const Rule& rule, double number) {
+  const auto* range = std::get_if<Range>(&rule.limits);
+  return range == nullptr || (number >= range->lowest && number <= range->highest);
 }
 
-std::string NameOf(Kind kind) {
-  switch (kind) {
+bool Fits(const Rule& rule, const std::string& text) {
+  switch (rule.kind) {
     case Kind::kBool:
-      return "true or false";
-    case Kind::kInteger:
-      return "a whole number";
-    case Kind::kReal:
-      return "a number";
+      return text == "true" || text == "false";
+    case Kind::kWhole: {
+      const auto number = Parse<int>(text);
+      return number && IsIn(rule, *number);
+    }
+    case Kind::kReal: {
+      const auto number = Parse<double>(text);
+      return number && IsIn(rule, *number);
+    }
     case Kind::kText:
-      return "text";
+      break;
   }
-  return "";
+  if (const auto* one_of = std::get_if<OneOf>(&rule.limits)) {
+    return std::find(one_of->texts.begin(), one_of->texts.end(), text) != one_of->texts.end();
+  }
+  const auto* like = std::get_if<Like>(&rule.limits);
+  return like == nullptr || like->matches(text);
 }
 
-// Whether `text` may stand where the default is `default_text`: a text key takes anything, a real one whole numbers
-// too.
-bool Fits(const std::string& text, const std::string& default_text) {
-  const Kind wanted = KindOf(default_text);
-  const Kind given = KindOf(text);
-  return wanted == given || wanted == Kind::kText || (wanted == Kind::kReal && given == Kind::kInteger);
+std::string Words(const Range& range) {
+  std::ostringstream words;
+  words.precision(10);
+  words << " from " << range.lowest << " to " << range.highest;
+  if (*range.unit != '\0') words << " " << range.unit;
+  return words.str();
+}
+
+// What must be written, to follow "must be".
+std::string Words(const Rule& rule) {
+  if (rule.kind == Kind::kBool) return "true or false";
+  if (const auto* range = std::get_if<Range>(&rule.limits)) {
+    return (rule.kind == Kind::kWhole ? "a whole number" : "a number") + Words(*range);
+  }
+  if (const auto* like = std::get_if<Like>(&rule.limits)) return like->words;
+  std::string words;
+  if (const auto* one_of = std::get_if<OneOf>(&rule.limits)) {
+    for (const std::string& text : one_of->texts) words += (words.empty() ? "" : " or ") + text;
+  }
+  return words;
+}
+
+template <class Section>
+void AddRules(std::map<std::string, Rule>& rules) {
+  Section section;
+  Section::Visit(section, [&](const char* name, auto& member, const auto&... limits) {
+    using Member = std::decay_t<decltype(member)>;
+    Rule rule;
+    if constexpr (std::is_same_v<Member, bool>) rule.kind = Kind::kBool;
+    if constexpr (std::is_same_v<Member, int>) rule.kind = Kind::kWhole;
+    if constexpr (std::is_same_v<Member, double>) rule.kind = Kind::kReal;
+    ((rule.limits = limits), ...);
+    rules[std::string(Section::kSection) + "." + name] = rule;
+  });
+}
+
+template <class... Sections>
+std::map<std::string, Rule> RulesOf(const std::tuple<Sections...>*) {
+  std::map<std::string, Rule> rules;
+  (AddRules<Sections>(rules), ...);
+  return rules;
+}
+
+// By "section.key".
+const std::map<std::string, Rule>& Rules() {
+  static const std::map<std::string, Rule> rules = RulesOf(static_cast<const AllSections*>(nullptr));
+  return rules;
 }
 
 // Calls visit(section.key, text) for every scalar of the two-level document.
@@ -79,15 +138,25 @@ void ForEachValue(const std::string& path, Visit visit) {
 
 }  // namespace
 
+bool IsChannelPrefix(const std::string& text) {
+  return text.size() <= 32 && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+           return (std::isalnum(c) != 0 && c < 128) || c == '_' || c == '-' || c == '/';
+         });
+}
+
 Settings Settings::LoadDefaults(const std::string& path) {
   Settings settings;
-  ForEachValue(path, [&](const std::string& key, const std::string& text) { settings.values_[key] = {text, path}; });
+  settings.OverrideFromFile(path);
+  for (const auto& [key, rule] : Rules()) {
+    if (!settings.texts_.contains(key)) {
+      throw InputError("settings file " + path + " lacks the key `" + key + "`: write all keys of config/default.yaml");
+    }
+  }
   return settings;
 }
 
 void Settings::OverrideFromFile(const std::string& path) {
-  ForEachValue(path,
-               [&](const std::string& key, const std::string& text) { Replace(key, text, "settings file " + path); });
+  ForEachValue(path, [&](const std::string& key, const std::string& text) { Set(key, text, "settings file " + path); });
 }
 
 void Settings::Override(const std::string& assignment) {
@@ -95,69 +164,30 @@ void Settings::Override(const std::string& assignment) {
   if (equals == std::string::npos) {
     throw InputError("--set " + assignment + ": write section.key=value");
   }
-  Replace(assignment.substr(0, equals), assignment.substr(equals + 1), "--set " + assignment);
+  Set(assignment.substr(0, equals), assignment.substr(equals + 1), "--set " + assignment);
 }
 
-void Settings::Replace(const std::string& key, const std::string& text, const std::string& origin) {
-  const auto it = values_.find(key);
-  if (it == values_.end()) {
+void Settings::Set(const std::string& key, const std::string& text, const std::string& origin) {
+  const auto rule = Rules().find(key);
+  if (rule == Rules().end()) {
     throw InputError(origin + ": unknown key `" + key + "`; config/default.yaml lists all keys");
   }
-  if (!Fits(text, it->second.text)) {
-    throw InputError(origin + ": `" + key + "` must be " + NameOf(KindOf(it->second.text)) + ", not `" + text + "`");
+  if (!Fits(rule->second, text)) {
+    throw InputError(origin + ": `" + key + "` must be " + Words(rule->second) + ", not `" + text + "`");
   }
-  it->second = {text, origin};
+  texts_[key] = text;
 }
 
-namespace {
-
-template <class T>
-T Parse(const std::string& key, const std::string& text, const std::string& origin, Kind kind) {
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) {
-    throw InputError(origin + ": `" + key + "` must be " + NameOf(kind) + " in range, not `" + text + "`");
-  }
-  return value;
-}
-
-}  // namespace
-
-template <>
-std::string Settings::Get<std::string>(const std::string& key) const {
-  const auto it = values_.find(key);
-  if (it == values_.end()) {
-    throw InputError("settings lack the key `" + key + "`; config/default.yaml must list it");
-  }
-  return it->second.text;
-}
-
-template <>
-bool Settings::Get<bool>(const std::string& key) const {
-  const auto text = Get<std::string>(key);
-  if (text != "true" && text != "false") {
-    throw InputError(values_.at(key).origin + ": `" + key + "` must be true or false, not `" + text + "`");
-  }
-  return text == "true";
-}
-
-template <>
-int Settings::Get<int>(const std::string& key) const {
-  const auto text = Get<std::string>(key);
-  return Parse<int>(key, text, values_.at(key).origin, Kind::kInteger);
-}
-
-template <>
-double Settings::Get<double>(const std::string& key) const {
-  const auto text = Get<std::string>(key);
-  return Parse<double>(key, text, values_.at(key).origin, Kind::kReal);
-}
+void Settings::Read(const std::string& key, std::string* member) const { *member = texts_.at(key); }
+void Settings::Read(const std::string& key, bool* member) const { *member = texts_.at(key) == "true"; }
+void Settings::Read(const std::string& key, int* member) const { *member = Parse<int>(texts_.at(key)).value(); }
+void Settings::Read(const std::string& key, double* member) const { *member = Parse<double>(texts_.at(key)).value(); }
 
 std::string Settings::ToYaml() const {
   YAML::Emitter out;
   out << YAML::BeginMap;
   std::string open_section;
-  for (const auto& [key, value] : values_) {
+  for (const auto& [key, text] : texts_) {
     const std::string section = key.substr(0, key.find('.'));
     if (section != open_section) {
       if (!open_section.empty()) out << YAML::EndMap;
@@ -165,8 +195,8 @@ std::string Settings::ToYaml() const {
       open_section = section;
     }
     out << YAML::Key << key.substr(section.size() + 1) << YAML::Value;
-    if (KindOf(value.text) == Kind::kText) out << YAML::DoubleQuoted;
-    out << value.text;
+    if (Rules().at(key).kind == Kind::kText) out << YAML::DoubleQuoted;
+    out << text;
   }
   if (!open_section.empty()) out << YAML::EndMap;
   out << YAML::EndMap;

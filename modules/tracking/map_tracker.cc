@@ -32,7 +32,8 @@ Result<> MapTrackerOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(matching.Check());
   TESSERA_RETURN_IF_FAILED(keyframes.Check());
   if (max_unanswered_keyframes < 2) return Failed("the tracker must send at least two keyframes without an answer");
-  if (min_inliers < 6 || max_local_keyframes < 1) return Failed("tracker.min_inliers must be at least 6");
+  if (min_inliers < 6 || max_local_keyframes < 1)
+    return Failed("a pose needs at least 6 inliers and one local keyframe");
   return {};
 }
 

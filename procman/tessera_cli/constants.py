@@ -20,8 +20,9 @@ STATUS, POSE, HEARTBEAT, CAMERA, END_OF_STREAM = "STATUS", "POSE", "HEARTBEAT", 
 PROCMAN_ORDER, PROCMAN_STATUS, PROCMAN_OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
 
 # --- Limits -------------------------------------------------------------------------------------------------------
-# Extractors that a dispatcher accepts.
+# Extractors that a dispatcher accepts, and keypoints that one extracts: kMaxExtractors, FeatureOptions::kMaxFeatures.
 MAX_INSTANCES = 256
+MAX_FEATURES = 50000
 # Of a process list or an order. A list of a hundred nodes takes some tens of kilobytes.
 MAX_LIST_BYTES = 1_000_000
 MAX_ORDER_BYTES = 1_000_000

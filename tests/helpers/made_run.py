@@ -39,7 +39,7 @@ def write_run(folder: Path, seed: int = 1, truth: bool = True, loops: bool = Tru
             "keyframe_timestamp_s,matched_timestamp_s,inliers,scale\n11.500000,0.500000,80,1.0\n"
         )
     (folder / "frames.csv").write_text(_frames_csv())
-    (folder / "settings.yaml").write_text("features:\n  num_features: 1234\n  num_levels: 8\n")
+    (folder / "settings.yaml").write_text("features:\n  num_features: 1234\n")
     (folder / "summary.json").write_text(json.dumps({**_summary(loops), **summary}))
     return folder
 

@@ -1,5 +1,6 @@
 #include "settings/settings.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -10,18 +11,16 @@
 namespace tessera {
 namespace {
 
-class SettingsTest : public testing::Test {
- protected:
-  std::string Write(const std::string& name, const std::string& text) {
-    const auto path = std::filesystem::path(testing::TempDir()) / name;
-    std::ofstream(path) << text;
-    return path.string();
-  }
-  Settings Example() {
-    return Settings::LoadDefaults(
-        Write("defaults.yaml", "camera:\n  source: \"\"\n  window: 6\n  factor: 1.5\n  on: true\n"));
-  }
-};
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr const char* kShipped = TESSERA_SOURCE_DIR "/config/default.yaml";
+
+std::string Write(const std::string& name, const std::string& text) {
+  const auto path = std::filesystem::path(testing::TempDir()) / name;
+  std::ofstream(path) << text;
+  return path.string();
+}
 
 // The sentence of the InputError that `action` throws; empty if it throws none.
 template <class Action>
@@ -34,52 +33,74 @@ std::string ErrorOf(Action action) {
   return "";
 }
 
-TEST_F(SettingsTest, GivesTypedValues) {
-  const Settings settings = Example();
-  EXPECT_EQ(settings.Get<std::string>("camera.source"), "");
-  EXPECT_EQ(settings.Get<int>("camera.window"), 6);
-  EXPECT_EQ(settings.Get<double>("camera.factor"), 1.5);
-  EXPECT_EQ(settings.Get<double>("camera.window"), 6.0);
-  EXPECT_TRUE(settings.Get<bool>("camera.on"));
+std::string ErrorOfSet(const std::string& assignment) {
+  Settings settings = Settings::LoadDefaults(kShipped);
+  return ErrorOf([&] { settings.Override(assignment); });
 }
 
-TEST_F(SettingsTest, OverridesKeepTheType) {
-  Settings settings = Example();
-  settings.Override("camera.window=8");
+TEST(Settings, TheShippedFileHoldsEveryKeyAndNoOther) {
+  const Settings settings = Settings::LoadDefaults(kShipped);
+  EXPECT_EQ(settings.Get<FeaturesSettings>().num_features, 2000);
+  EXPECT_EQ(settings.Get<CameraSettings>().sensor, "mono");
+  EXPECT_EQ(settings.Get<TrackerSettings>().max_lost_s, 1.5);
+  EXPECT_TRUE(settings.Get<MapperSettings>().close_loops);
+}
+
+TEST(Settings, LaterOverridesAreStronger) {
+  Settings settings = Settings::LoadDefaults(kShipped);
+  settings.OverrideFromFile(Write("user.yaml", "tracker:\n  max_lost_s: 2\n  live: true\ncamera:\n  source: a\n"));
   settings.Override("camera.source=kitti:/a=b");
-  settings.Override("camera.factor=2");
-  EXPECT_EQ(settings.Get<int>("camera.window"), 8);
-  EXPECT_EQ(settings.Get<std::string>("camera.source"), "kitti:/a=b");
-  EXPECT_NE(ErrorOf([&] { settings.Override("camera.window=many"); }).find("camera.window"), std::string::npos);
-  EXPECT_NE(ErrorOf([&] { settings.Override("camera.window=1.5"); }).find("whole number"), std::string::npos);
-  EXPECT_NE(ErrorOf([&] { settings.Override("camera.on=1"); }).find("true or false"), std::string::npos);
-  EXPECT_NE(ErrorOf([&] { settings.Override("camera.window"); }).find("section.key=value"), std::string::npos);
+  settings.Override("tracker.max_lost_s=3");
+  EXPECT_EQ(settings.Get<CameraSettings>().source, "kitti:/a=b");
+  EXPECT_EQ(settings.Get<TrackerSettings>().max_lost_s, 3.0) << "a whole number is a number";
+  EXPECT_TRUE(settings.Get<TrackerSettings>().live);
 }
 
-TEST_F(SettingsTest, UnknownAndMissingKeysFailWithFileAndKey) {
-  Settings settings = Example();
-  EXPECT_NE(ErrorOf([&] { settings.Override("camera.widow=1"); }).find("camera.widow"), std::string::npos);
+TEST(Settings, AValueMustBeOfItsType) {
+  EXPECT_THAT(ErrorOfSet("tracker.map_delay_frames=many"), HasSubstr("a whole number from 1 to 1000 frames"));
+  EXPECT_THAT(ErrorOfSet("tracker.map_delay_frames=1.5"), HasSubstr("not `1.5`"));
+  EXPECT_THAT(ErrorOfSet("tracker.map_delay_frames=99999999999999"), HasSubstr("a whole number"));
+  EXPECT_THAT(ErrorOfSet("tracker.max_lost_s=soon"), HasSubstr("a number from 0 to 1000000 s"));
+  EXPECT_THAT(ErrorOfSet("tracker.max_lost_s=nan"), HasSubstr("not `nan`"));
+  EXPECT_THAT(ErrorOfSet("tracker.live=1"), HasSubstr("true or false"));
+}
+
+TEST(Settings, AValueMustBeInItsRange) {
+  EXPECT_THAT(ErrorOfSet("features.num_features=50001"),
+              AllOf(HasSubstr("`features.num_features`"), HasSubstr("1 to 50000 keypoints"), HasSubstr("`50001`")));
+  EXPECT_EQ(ErrorOfSet("features.num_features=50000"), "");
+  EXPECT_THAT(ErrorOfSet("tracker.map_delay_frames=0"), HasSubstr("map_delay_frames"));
+  EXPECT_THAT(ErrorOfSet("camera.sensor=sonar"), HasSubstr("mono or stereo or rgbd"));
+  EXPECT_THAT(ErrorOfSet("bus.channel_prefix=a b"), HasSubstr("letters"));
+  EXPECT_EQ(ErrorOfSet("bus.channel_prefix=robot_1/"), "");
+}
+
+TEST(Settings, ASentenceNamesTheFileAndTheKey) {
+  Settings settings = Settings::LoadDefaults(kShipped);
   const std::string path = Write("user.yaml", "camera:\n  widow: 1\n");
-  const std::string sentence = ErrorOf([&] { settings.OverrideFromFile(path); });
-  EXPECT_NE(sentence.find(path), std::string::npos);
-  EXPECT_NE(sentence.find("camera.widow"), std::string::npos);
-  EXPECT_NE(ErrorOf([&] { (void)settings.Get<int>("camera.nothing"); }), "");
-  EXPECT_NE(ErrorOf([] { Settings::LoadDefaults("/no/such.yaml"); }).find("/no/such.yaml"), std::string::npos);
-  EXPECT_NE(ErrorOf([&] { Settings::LoadDefaults(Write("broken.yaml", "a: [1\n")); }), "");
-  EXPECT_NE(ErrorOf([&] { Settings::LoadDefaults(Write("flat.yaml", "a: 1\n")); }), "");
+  EXPECT_THAT(ErrorOf([&] { settings.OverrideFromFile(path); }), AllOf(HasSubstr(path), HasSubstr("camera.widow")));
+  const std::string out_of_range = Write("range.yaml", "camera:\n  lockstep_window: 0\n");
+  EXPECT_THAT(ErrorOf([&] { settings.OverrideFromFile(out_of_range); }),
+              AllOf(HasSubstr(out_of_range), HasSubstr("camera.lockstep_window"), HasSubstr("1 to 1000")));
+  EXPECT_THAT(ErrorOfSet("camera.widow=1"), HasSubstr("camera.widow"));
+  EXPECT_THAT(ErrorOfSet("camera.source"), HasSubstr("section.key=value"));
 }
 
-TEST_F(SettingsTest, YamlReadsBackTheSame) {
-  Settings settings = Example();
+TEST(Settings, DefaultsMustBeWholeAndWellFormed) {
+  const std::string some = Write("some.yaml", "camera:\n  source: \"\"\n");
+  EXPECT_THAT(ErrorOf([&] { Settings::LoadDefaults(some); }), AllOf(HasSubstr(some), HasSubstr("lacks the key")));
+  EXPECT_THAT(ErrorOf([] { Settings::LoadDefaults("/no/such.yaml"); }), HasSubstr("/no/such.yaml"));
+  EXPECT_NE(ErrorOf([] { Settings::LoadDefaults(Write("broken.yaml", "a: [1\n")); }), "");
+  EXPECT_NE(ErrorOf([] { Settings::LoadDefaults(Write("flat.yaml", "a: 1\n")); }), "");
+}
+
+TEST(Settings, YamlReadsBackTheSame) {
+  Settings settings = Settings::LoadDefaults(kShipped);
   settings.Override("camera.source=a \"quoted\": # text");
+  settings.Override("camera.pace=0.5");
   const Settings again = Settings::LoadDefaults(Write("again.yaml", settings.ToYaml()));
   EXPECT_EQ(again.ToYaml(), settings.ToYaml());
-  EXPECT_EQ(again.Get<std::string>("camera.source"), "a \"quoted\": # text");
-}
-
-TEST(ShippedSettings, DefaultsLoad) {
-  const Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
-  EXPECT_EQ(settings.Get<int>("features.num_features"), 2000);
+  EXPECT_EQ(again.Get<CameraSettings>().source, "a \"quoted\": # text");
 }
 
 }  // namespace

@@ -2,57 +2,63 @@
 // algorithms, everything runs alike.
 #include <gtest/gtest.h>
 
-#include "loop_closing/loop_closer.h"
-#include "mapping/mapper.h"
+#include "datasets/pacer.h"
+#include "distribution/work_queue.h"
+#include "loop_closing/loop_closer_session.h"
+#include "mapping/mapper_session.h"
 #include "settings/settings.h"
 #include "tracking/map_tracker.h"
 
 namespace tessera {
 namespace {
 
-Settings Defaults() { return Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml"); }
+template <class Section>
+Section Defaults() {
+  return Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml").Get<Section>();
+}
 
 TEST(DefaultSettings, OfTheTracker) {
-  const Settings settings = Defaults();
+  const auto settings = Defaults<TrackerSettings>();
   const MapTrackerOptions options;
-  EXPECT_EQ(settings.Get<int>("tracker.min_inliers"), options.min_inliers);
-  EXPECT_EQ(settings.Get<int>("tracker.max_local_keyframes"), options.max_local_keyframes);
-  EXPECT_EQ(settings.Get<double>("tracker.max_lost_s"), 1e-6 * static_cast<double>(options.max_lost_us));
-  EXPECT_EQ(settings.Get<double>("tracker.keyframe_min_share"), options.keyframes.min_share);
-  EXPECT_EQ(settings.Get<double>("tracker.keyframe_min_parallax_rad"), options.keyframes.min_parallax_rad);
-  EXPECT_EQ(settings.Get<double>("tracker.keyframe_max_interval_s"),
-            1e-6 * static_cast<double>(options.keyframes.max_interval_us));
+  EXPECT_EQ(settings.max_lost_s, 1e-6 * static_cast<double>(options.max_lost_us));
+  EXPECT_EQ(settings.localize_only, !options.makes_keyframes);
+  EXPECT_EQ(settings.keyframe_min_share, options.keyframes.min_share);
+  EXPECT_EQ(settings.keyframe_min_parallax_rad, options.keyframes.min_parallax_rad);
+  EXPECT_EQ(settings.keyframe_max_interval_s, 1e-6 * static_cast<double>(options.keyframes.max_interval_us));
 }
 
 TEST(DefaultSettings, OfTheMapper) {
-  const Settings settings = Defaults();
-  const MapperOptions options;
-  EXPECT_EQ(settings.Get<int>("mapper.creation_neighbours"), options.creation.max_neighbors);
-  EXPECT_EQ(settings.Get<double>("mapper.min_parallax_rad"), options.creation.min_parallax_rad);
-  EXPECT_EQ(settings.Get<int>("mapper.max_hamming"), options.creation.max_hamming);
-  EXPECT_EQ(settings.Get<int>("mapper.max_hamming"), options.fusion.max_hamming);
-  EXPECT_EQ(settings.Get<int>("mapper.fusion_neighbours"), options.fusion.max_neighbors);
-  EXPECT_EQ(settings.Get<int>("mapper.min_shared_landmarks"), options.window.min_shared_landmarks);
-  EXPECT_EQ(settings.Get<int>("mapper.max_inner_keyframes"), options.window.max_inner_keyframes);
-  EXPECT_EQ(settings.Get<int>("mapper.max_outer_keyframes"), options.window.max_outer_keyframes);
-  EXPECT_EQ(settings.Get<bool>("mapper.always_ceres"), options.bundle.is_always_ceres);
-  EXPECT_EQ(settings.Get<int>("mapper.bundle_iterations"), options.bundle.max_num_iterations);
-  EXPECT_EQ(settings.Get<double>("mapper.redundant_share"), options.keyframe_culling.redundant_share);
+  const auto settings = Defaults<MapperSettings>();
+  const MapperSessionOptions options;
+  EXPECT_EQ(settings.min_parallax_rad, options.mapper.creation.min_parallax_rad);
+  EXPECT_EQ(settings.max_inner_keyframes, options.mapper.window.max_inner_keyframes);
+  EXPECT_EQ(settings.max_outer_keyframes, options.mapper.window.max_outer_keyframes);
+  EXPECT_EQ(settings.loop_delay_keyframes, options.delays.loop_keyframes);
+  EXPECT_EQ(settings.adjustment_delay_keyframes, options.delays.adjustment_keyframes);
+  EXPECT_EQ(settings.close_loops, options.closes_loops);
 }
 
-TEST(DefaultSettings, OfLoops) {
-  const Settings settings = Defaults();
-  const LoopCloserOptions options;
-  EXPECT_EQ(settings.Get<int>("loop_closer.min_matches"), options.verification.min_matches);
-  EXPECT_EQ(settings.Get<int>("loop_closer.min_aligned"), options.verification.similarity.min_inliers);
-  EXPECT_EQ(settings.Get<int>("loop_closer.min_seen"), options.verification.min_seen);
-  EXPECT_EQ(settings.Get<int>("loop_closer.min_relocalized"), options.relocalization.min_seen);
-  EXPECT_EQ(settings.Get<double>("loop_closer.min_coverage"), options.verification.min_coverage);
-  EXPECT_EQ(settings.Get<double>("loop_closer.min_coverage"), options.relocalization.min_coverage);
-  EXPECT_EQ(settings.Get<int>("mapper.loop_delay_keyframes"), CorrectionDelays{}.loop_keyframes);
-  EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_keyframes"), CorrectionDelays{}.adjustment_keyframes);
-  EXPECT_EQ(settings.Get<int>("mapper.adjustment_delay_growth"), CorrectionDelays{}.adjustment_growth);
-  EXPECT_EQ(settings.Get<int>("global_adjuster.iterations"), GlobalBundleOptions().max_num_iterations);
+TEST(DefaultSettings, OfTheLoopCloser) {
+  const auto settings = Defaults<LoopCloserSettings>();
+  const LoopCloserSessionOptions options;
+  EXPECT_EQ(settings.min_seen, options.loop_closer.verification.min_seen);
+  EXPECT_EQ(settings.min_coverage, options.loop_closer.verification.min_coverage);
+  EXPECT_EQ(settings.min_relocalized, options.loop_closer.relocalization.min_seen);
+  EXPECT_EQ(settings.min_coverage, options.loop_closer.relocalization.min_coverage);
+  EXPECT_EQ(Defaults<MapperSettings>().loop_delay_keyframes, options.loop_delay_keyframes);
+}
+
+TEST(DefaultSettings, OfExtractionAndItsDistribution) {
+  const WorkQueueOptions options;
+  const auto dispatcher = Defaults<DispatcherSettings>();
+  EXPECT_EQ(ParseTileGrid(dispatcher.tiles), options.grid);
+  EXPECT_EQ(dispatcher.max_queued_frames, options.max_queued_frames);
+  EXPECT_EQ(dispatcher.max_frames_in_flight, options.max_frames_in_flight);
+  const auto features = Defaults<FeaturesSettings>();
+  EXPECT_EQ(features.num_features, options.features.num_features);
+  EXPECT_EQ(features.min_score, options.features.min_score);
+  EXPECT_EQ(features.max_disparity_px, options.features.max_disparity_px);
+  EXPECT_EQ(Defaults<CameraSettings>().lockstep_window, PacerOptions{}.lockstep_window);
 }
 
 }  // namespace

@@ -1,15 +1,8 @@
-// Wiring of the camera: a source of frames on one side, CALIBRATION, GROUND_TRUTH, CAMERA and END_OF_STREAM
-// on the other. One frame is read ahead, so that decoding it delays nobody.
+// Wiring of the camera: a source of frames and poses in; CALIBRATION, GROUND_TRUTH, CAMERA and END_OF_STREAM out. Which
+// frame is sent when stands in datasets/camera_session.h.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-
-#include "datasets/frame_source.h"
-#include "datasets/pacer.h"
-#include "datasets/renumbering.h"
-#include "messages/end_of_stream.h"
+#include "datasets/camera_session.h"
 #include "runtime/stage.h"
 
 namespace tessera {
@@ -25,30 +18,16 @@ class CameraStage {
 
  private:
   bool Step();
-  void ReadNext();
-  void SkipTracked();
-  void SendNext();
-  void SendGroundTruthUpTo(FrameId frame);
+  bool Read();
+  void Send();
   void End();
-  void WatchPoses();
 
   StageContext& context_;
-  std::unique_ptr<FrameSource> source_;
-  Pacer pacer_;
-  Renumbering renumbering_;  // of a live source
+  CameraSession session_;
   Publisher<CameraCalibration> calibration_;
   Publisher<GroundTruthPose> ground_truth_;
   Publisher<CameraFrame> frames_;
   Publisher<EndOfStream> end_of_stream_;
-  std::optional<CameraFrame> next_;  // read and not yet sent
-  size_t num_truths_sent_ = 0;
-  int64_t num_sent_ = 0;
-  FrameId last_sent_;
-  FrameId tracked_;  // this frame, and all before it, have a pose
-  int64_t tracked_utime_us_ = 0;
-  int64_t last_progress_us_ = 0;  // when a frame was last sent or a pose last came
-  bool has_ended_ = false;
-  bool warned_ = false;
 };
 
 }  // namespace tessera

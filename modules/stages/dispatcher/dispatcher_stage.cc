@@ -2,29 +2,23 @@
 
 #include <string>
 
-#include "core/errors.h"
 #include "messages/tracking_types.h"
 
 namespace tessera {
 namespace {
 
 DispatcherOptions OptionsFrom(const StageContext& context) {
-  const Settings& settings = context.settings();
-  DispatcherOptions result{.epoch_us = context.epoch_us(), .max_kept_bytes = settings.Get<int>("stream.history_bytes")};
-  WorkQueueOptions& options = result.queue;
-  options.grid = ParseTileGrid(settings.Get<std::string>("dispatcher.tiles"));
-  options.coarse_levels_from = settings.Get<int>("dispatcher.coarse_levels_from");
-  options.max_queued_frames = settings.Get<int>("dispatcher.max_queued_frames");
-  options.max_frames_in_flight = settings.Get<int>("dispatcher.max_frames_in_flight");
-  options.jobs_per_extractor = settings.Get<int>("dispatcher.jobs_per_extractor");
-  options.late_us = 1000LL * settings.Get<int>("dispatcher.late_ms");
-  options.silent_us = 1000LL * settings.Get<int>("dispatcher.silent_ms");
-  options.features.num_features = settings.Get<int>("features.num_features");
-  options.features.num_levels = settings.Get<int>("features.num_levels");
-  options.features.min_score = settings.Get<int>("features.min_score");
-  options.features.max_disparity_px = settings.Get<int>("features.max_disparity_px");
-  ThrowIfFailed<InputError>(options.Check());
-  return result;
+  const auto dispatcher = context.settings().Get<DispatcherSettings>();
+  const auto features = context.settings().Get<FeaturesSettings>();
+  DispatcherOptions options{.epoch_us = context.epoch_us(),
+                            .max_kept_bytes = context.settings().Get<StreamTimingSettings>().history_bytes};
+  options.queue.grid = ParseTileGrid(dispatcher.tiles);
+  options.queue.max_queued_frames = dispatcher.max_queued_frames;
+  options.queue.max_frames_in_flight = dispatcher.max_frames_in_flight;
+  options.queue.features.num_features = features.num_features;
+  options.queue.features.min_score = features.min_score;
+  options.queue.features.max_disparity_px = features.max_disparity_px;
+  return options;
 }
 
 }  // namespace

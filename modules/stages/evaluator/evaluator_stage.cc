@@ -23,7 +23,7 @@ StageFigures FiguresOf(const StageStatus& status) {
 
 // Makes the folder, so that a wrong path is found before the run.
 std::string OutDirFrom(const Settings& settings) {
-  auto out_dir = settings.Get<std::string>("evaluator.out_dir");
+  auto out_dir = settings.Get<EvaluatorSettings>().out_dir;
   std::error_code error;
   if (!out_dir.empty()) std::filesystem::create_directories(out_dir, error);
   if (!error) return out_dir;
@@ -37,7 +37,7 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
       out_dir_(OutDirFrom(context.settings())),
       end_(context.name()),
       map_(
-          context, !context.settings().Get<std::string>("mapper.load_map").empty(),
+          context, !context.settings().Get<MapperSettings>().load_map.empty(),
           [this](const MapFollower::Delta& delta) { return Apply(*delta); },
           [this] {
             end_.NoteMap(map_.needs_snapshot() ? -1 : record_.map().next_delta(), context_.now_us());
@@ -97,7 +97,7 @@ void EvaluatorStage::Write() {
   is_written_ = true;  // also when it fails: trying again would fail again
   if (out_dir_.empty()) return;
   WriteMapFile(record_.map(), out_dir_ + "/map.tessera");
-  if (const auto path = context_.settings().Get<std::string>("evaluator.save_map"); !path.empty()) {
+  if (const auto path = context_.settings().Get<EvaluatorSettings>().save_map; !path.empty()) {
     WriteMapFile(record_.map(), path);
   }
   WriteRun(record_, out_dir_);

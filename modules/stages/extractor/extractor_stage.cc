@@ -15,8 +15,8 @@ constexpr int64_t kRecentUs = 2'000'000;
 
 // extractor.robots: the prefixes of the robots that are served besides the one of this process's own prefix.
 std::vector<std::string> OtherRobots(const Settings& settings) {
-  const auto text = settings.Get<std::string>("extractor.robots");
-  std::set<std::string> known{settings.Get<std::string>("bus.channel_prefix")};
+  const auto text = settings.Get<ExtractorSettings>().robots;
+  std::set<std::string> known{settings.Get<BusSettings>().channel_prefix};
   std::vector<std::string> robots;
   std::istringstream words(text);
   for (std::string prefix; std::getline(words, prefix, ',');) {
@@ -42,7 +42,7 @@ ExtractorStage::ExtractorStage(StageContext& context) : ExtractorStage(context, 
 ExtractorStage::ExtractorStage(StageContext& context, const std::vector<std::string>& other_robots)
     : context_(context), queue_(1 + other_robots.size()) {
   began_us_ = context.now_us();
-  robots_.push_back({.context = &context, .prefix = context.settings().Get<std::string>("bus.channel_prefix")});
+  robots_.push_back({.context = &context, .prefix = context.settings().Get<BusSettings>().channel_prefix});
   Serve(0);
   for (const std::string& prefix : other_robots) {
     robots_.push_back({.context = &context.JoinRobot(prefix), .prefix = prefix});
@@ -55,7 +55,7 @@ ExtractorStage::ExtractorStage(StageContext& context, const std::vector<std::str
 }
 
 void ExtractorStage::ServeOthers() {
-  const int64_t two_heartbeats_us = 2000LL * context_.settings().Get<int>("stream.heartbeat_ms");
+  const int64_t two_heartbeats_us = 2000LL * context_.settings().Get<StreamTimingSettings>().heartbeat_ms;
   if (context_.now_us() - began_us_ < two_heartbeats_us) return;
   for (size_t robot = 0; robot < robots_.size(); ++robot) {
     if (!robots_[robot].is_served && !robots_[robot].context->fell_silent()) Serve(robot);

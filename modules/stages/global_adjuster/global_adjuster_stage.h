@@ -2,7 +2,6 @@
 #pragma once
 
 #include "messages/loop_types.h"
-#include "optimization/bundle_adjustment.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
 
@@ -16,7 +15,6 @@ class GlobalAdjusterStage {
   Result<> Apply(const MapDelta& delta);
 
   StageContext& context_;
-  const BundleOptions options_;
   Map replica_;
   MapSubscription map_;
   Publisher<GlobalAdjustment> adjustments_;

@@ -1,31 +1,28 @@
 #include "stages/loop_closer/loop_closer_stage.h"
 
 #include <string>
-#include <utility>
+#include <variant>
 
-#include "core/errors.h"
 #include "core/session_actions.h"
 
 namespace tessera {
 namespace {
 
 LoopCloserSessionOptions OptionsFrom(const Settings& settings) {
-  LoopCloserSessionOptions result;
-  LoopCloserOptions& options = result.loop_closer;
-  options.verification.min_matches = settings.Get<int>("loop_closer.min_matches");
-  options.verification.similarity.min_inliers = settings.Get<int>("loop_closer.min_aligned");
-  options.verification.min_seen = settings.Get<int>("loop_closer.min_seen");
-  options.relocalization.min_seen = settings.Get<int>("loop_closer.min_relocalized");
-  options.verification.min_coverage = options.relocalization.min_coverage =
-      settings.Get<double>("loop_closer.min_coverage");
-  ThrowIfFailed<InputError>(options.Check(), "loop_closer: ");
-  result.closes_loops = settings.Get<bool>("mapper.close_loops");
-  result.loop_delay_keyframes = settings.Get<int>("mapper.loop_delay_keyframes");
-  return result;
+  const auto loop_closer = settings.Get<LoopCloserSettings>();
+  const auto mapper = settings.Get<MapperSettings>();
+  LoopCloserSessionOptions options;
+  options.loop_closer.verification.min_seen = loop_closer.min_seen;
+  options.loop_closer.verification.min_coverage = loop_closer.min_coverage;
+  options.loop_closer.relocalization.min_seen = loop_closer.min_relocalized;
+  options.loop_closer.relocalization.min_coverage = loop_closer.min_coverage;
+  options.closes_loops = mapper.close_loops;
+  options.loop_delay_keyframes = mapper.loop_delay_keyframes;
+  return options;
 }
 
 std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
-  const auto path = settings.Get<std::string>("loop_closer.vocabulary");
+  const std::string path = settings.Get<LoopCloserSettings>().vocabulary;
   return Vocabulary::Load(path.empty() ? TESSERA_VOCABULARY : path);
 }
 

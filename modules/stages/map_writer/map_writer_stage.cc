@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 std::string PathFrom(const Settings& settings) {
-  auto path = settings.Get<std::string>("map_writer.path");
+  auto path = settings.Get<MapWriterSettings>().path;
   if (path.empty()) {
     throw InputError("map_writer.path is empty: say where the map goes with --set map_writer.path=FILE.ply");
   }
@@ -22,7 +22,7 @@ std::string PathFrom(const Settings& settings) {
 MapWriterStage::MapWriterStage(StageContext& context)
     : context_(context),
       path_(PathFrom(context.settings())),
-      follows_(context.settings().Get<bool>("map_writer.follow")),
+      follows_(context.settings().Get<MapWriterSettings>().follow),
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); }, [this] { WriteIfDone(); }) {
   map_.FollowToEnd();

@@ -1,8 +1,6 @@
 #include "stages/mapper/mapper_stage.h"
 
-#include <algorithm>
 #include <memory>
-#include <utility>
 
 #include "core/errors.h"
 #include "wire/map_file.h"
@@ -10,39 +8,27 @@
 namespace tessera {
 namespace {
 
-MapperSessionOptions OptionsFrom(const Settings& settings) {
-  MapperSessionOptions result;
-  MapperOptions& options = result.mapper;
-  options.creation.max_neighbors = settings.Get<int>("mapper.creation_neighbours");
-  options.creation.min_parallax_rad = settings.Get<double>("mapper.min_parallax_rad");
-  options.creation.max_hamming = settings.Get<int>("mapper.max_hamming");
-  options.fusion.max_neighbors = settings.Get<int>("mapper.fusion_neighbours");
-  options.fusion.max_hamming = settings.Get<int>("mapper.max_hamming");
-  options.window.min_shared_landmarks = settings.Get<int>("mapper.min_shared_landmarks");
-  options.window.max_inner_keyframes = settings.Get<int>("mapper.max_inner_keyframes");
-  options.window.max_outer_keyframes = settings.Get<int>("mapper.max_outer_keyframes");
-  options.window.is_double = settings.Get<bool>("mapper.double_window");
-  options.bundle.is_always_ceres = settings.Get<bool>("mapper.always_ceres");
-  options.bundle.max_num_iterations = settings.Get<int>("mapper.bundle_iterations");
-  options.keyframe_culling.redundant_share = settings.Get<double>("mapper.redundant_share");
-  result.delays = {settings.Get<int>("mapper.loop_delay_keyframes"),
-                   settings.Get<int>("mapper.adjustment_delay_keyframes"),
-                   settings.Get<int>("mapper.adjustment_delay_growth")};
-  result.closes_loops = settings.Get<bool>("mapper.close_loops");
-  ThrowIfFailed<InputError>(result.Check(), "mapper: ");
-  return result;
+MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
+  MapperSessionOptions options;
+  options.mapper.creation.min_parallax_rad = settings.min_parallax_rad;
+  options.mapper.window.max_inner_keyframes = settings.max_inner_keyframes;
+  options.mapper.window.max_outer_keyframes = settings.max_outer_keyframes;
+  options.delays.loop_keyframes = settings.loop_delay_keyframes;
+  options.delays.adjustment_keyframes = settings.adjustment_delay_keyframes;
+  options.closes_loops = settings.close_loops;
+  return options;
 }
 
 }  // namespace
 
 MapperStage::MapperStage(StageContext& context)
     : context_(context),
-      session_(OptionsFrom(context.settings())),
+      session_(OptionsFrom(context.settings().Get<MapperSettings>())),
       deltas_(context.Advertise(kMapDelta)),
       pages_(context.Advertise(kMapSnapshot)),
       removed_(context.Advertise(kRemovedKeyframes)),
       end_of_stream_(context.Advertise(kEndOfStream)) {
-  if (const auto path = context.settings().Get<std::string>("mapper.load_map"); !path.empty()) {
+  if (const auto path = context.settings().Get<MapperSettings>().load_map; !path.empty()) {
     const auto loaded = session_.Load(ReadMapFile(path));
     if (!loaded) throw InputError("map file " + path + " is damaged: " + loaded.error().sentence);
     Do(*loaded);

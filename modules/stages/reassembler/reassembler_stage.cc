@@ -1,24 +1,17 @@
 #include "stages/reassembler/reassembler_stage.h"
 
-#include "core/errors.h"
 #include "features/selection.h"
 #include "messages/tracking_types.h"
 
 namespace tessera {
 namespace {
 
-int MaxOpenFrames(const Settings& settings) {
-  const int max_open_frames = settings.Get<int>("reassembler.max_open_frames");
-  if (max_open_frames < 1) {
-    throw InputError("reassembler.max_open_frames must be at least 1");
-  }
-  return max_open_frames;
-}
+// Frames that wait for tiles; more than that means that the dispatcher's flow control failed.
+constexpr int kMaxOpenFrames = 64;
 
 }  // namespace
 
-ReassemblerStage::ReassemblerStage(StageContext& context)
-    : context_(context), assembler_(MaxOpenFrames(context.settings())) {
+ReassemblerStage::ReassemblerStage(StageContext& context) : context_(context), assembler_(kMaxOpenFrames) {
   features_ = context.Advertise(kFeatures);
   acks_ = context.Advertise(kTileAck);
   end_of_stream_ = context.Advertise(kEndOfStream);

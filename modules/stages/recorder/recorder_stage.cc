@@ -9,7 +9,7 @@ namespace tessera {
 namespace {
 
 std::string PathFrom(const Settings& settings) {
-  const auto path = settings.Get<std::string>("recorder.path");
+  const auto path = settings.Get<RecorderSettings>().path;
   if (path.empty()) {
     throw InputError("recorder.path is empty: name the log to write, --set recorder.path=FILE");
   }

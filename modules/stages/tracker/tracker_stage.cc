@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <memory>
+#include <string>
 #include <utility>
 
-#include "core/errors.h"
 #include "wire/recorded_steps.h"
 
 namespace tessera {
@@ -13,40 +13,37 @@ namespace {
 // A loop closer that was started again did not hear the question.
 constexpr std::chrono::milliseconds kAskAgain{500};
 
-MapTrackerOptions OptionsFrom(const Settings& settings) {
+bool BeginsWithMap(const Settings& settings) { return !settings.Get<MapperSettings>().load_map.empty(); }
+
+MapTrackerOptions OptionsFrom(const TrackerSettings& settings) {
   MapTrackerOptions options;
-  options.min_inliers = settings.Get<int>("tracker.min_inliers");
-  options.max_local_keyframes = settings.Get<int>("tracker.max_local_keyframes");
-  options.max_lost_us = std::llround(1e6 * settings.Get<double>("tracker.max_lost_s"));
-  options.makes_keyframes = !settings.Get<bool>("tracker.localize_only");
-  options.keyframes.min_share = settings.Get<double>("tracker.keyframe_min_share");
-  options.keyframes.min_parallax_rad = settings.Get<double>("tracker.keyframe_min_parallax_rad");
-  options.keyframes.max_interval_us = std::llround(1e6 * settings.Get<double>("tracker.keyframe_max_interval_s"));
-  ThrowIfFailed<InputError>(options.Check(), "tracker: ");
+  options.max_lost_us = std::llround(1e6 * settings.max_lost_s);
+  options.makes_keyframes = !settings.localize_only;
+  options.keyframes.min_share = settings.keyframe_min_share;
+  options.keyframes.min_parallax_rad = settings.keyframe_min_parallax_rad;
+  options.keyframes.max_interval_us = std::llround(1e6 * settings.keyframe_max_interval_s);
   return options;
 }
 
-std::unique_ptr<TrackerTime> TimeFrom(const Settings& settings) {
-  if (const auto log = settings.Get<std::string>("tracker.replay_log"); !log.empty()) {
-    RecordedSteps recorded = ReadRecordedSteps(log, settings.Get<std::string>("bus.channel_prefix"));
+std::unique_ptr<TrackerTime> TimeFrom(const TrackerSettings& settings, const std::string& channel_prefix) {
+  if (!settings.replay_log.empty()) {
+    RecordedSteps recorded = ReadRecordedSteps(settings.replay_log, channel_prefix);
     if (recorded.is_live) return std::make_unique<ReplayTime>(std::move(recorded));
   }
-  const bool may_ask = settings.Get<bool>("tracker.relocalize");
-  if (settings.Get<bool>("tracker.live")) return std::make_unique<LiveTime>(may_ask);
-  const int delay_frames = settings.Get<int>("tracker.map_delay_frames");
-  if (delay_frames < 1) {
-    throw InputError("tracker.map_delay_frames must be at least 1: no mapper can answer within the same frame");
-  }
-  return std::make_unique<LogicalTime>(delay_frames, may_ask);
+  if (settings.live) return std::make_unique<LiveTime>(settings.relocalize);
+  return std::make_unique<LogicalTime>(settings.map_delay_frames, settings.relocalize);
 }
 
-bool BeginsWithMap(const Settings& settings) { return !settings.Get<std::string>("mapper.load_map").empty(); }
+TrackerSession MakeSession(const Settings& settings) {
+  const auto tracker = settings.Get<TrackerSettings>();
+  return {OptionsFrom(tracker), TimeFrom(tracker, settings.Get<BusSettings>().channel_prefix), BeginsWithMap(settings)};
+}
 
 }  // namespace
 
 TrackerStage::TrackerStage(StageContext& context)
     : context_(context),
-      session_(OptionsFrom(context.settings()), TimeFrom(context.settings()), BeginsWithMap(context.settings())),
+      session_(MakeSession(context.settings())),
       map_(
           context, BeginsWithMap(context.settings()),
           [this](const MapFollower::Delta& delta) { return session_.Receive(delta); }, [this] { Advance(); }) {

@@ -3,7 +3,7 @@
 import os
 
 from tessera_cli.cli.parsing import Parser, assignment, frames, pace, tiles, whole_number
-from tessera_cli.constants import DEFAULT_PORT, MAX_INSTANCES
+from tessera_cli.constants import DEFAULT_PORT, MAX_FEATURES, MAX_INSTANCES
 
 SOURCES = """\
 SOURCE is one of
@@ -19,8 +19,6 @@ SOURCE is one of
   log:FILE     a log recorded by `tessera record`, `tessera run --record` or lcm-logger
   bus:[URL]    frames that another program, such as lcm-logplayer, publishes; default: this stack's main bus
 """
-# The extractors' own limit (features/feature_types.cc), checked before anything starts.
-MAX_FEATURES = 50000
 
 
 def add_features(parser: Parser) -> None:

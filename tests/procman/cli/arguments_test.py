@@ -50,7 +50,7 @@ def test_arguments_at_fault(tessera: Tessera, arguments: list[Any], word: str) -
         ("camera.source=kitti:/tmp", "SOURCE"),
         ("tracker.live=true", "--live"),
         ("tracker.map_delay_frames=0", "map_delay_frames"),
-        ("mapper.bundle_iterations=0", "mapper"),
+        ("mapper.max_inner_keyframes=0", "mapper"),
     ],
 )
 def test_settings_at_fault(tessera: Tessera, sequence: Path, setting: str, word: str) -> None:
@@ -63,7 +63,7 @@ def test_missing_calibration_file(tessera: Tessera, sequence: Path) -> None:
 
 
 def test_settings_of_a_stage_at_fault(tessera: Tessera, sequence: Path) -> None:
-    """A value of the right type that makes no sense: the stage that reads it says so."""
-    finished = tessera.run(f"kitti:{sequence}", "--set", "features.num_levels=0")
+    """A value that only the stage which uses it can judge."""
+    finished = tessera.run(f"kitti:{sequence}", "--set", "loop_closer.vocabulary=/no/such/file")
     assert finished.status == 2, finished.out + finished.err
-    assert "num_levels" in finished.err
+    assert "/no/such/file" in finished.err

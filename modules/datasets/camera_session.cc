@@ -1,0 +1,85 @@
+#include "datasets/camera_session.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/errors.h"
+
+namespace tessera {
+
+CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const PacerOptions& pace, int64_t num_on_the_way,
+                             int64_t now_us)
+    : source_(std::move(source)), pacer_(pace), renumbering_(num_on_the_way), last_progress_us_(now_us) {}
+
+void CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us) {
+  if (frame > tracked_) {
+    tracked_ = frame;
+    tracked_utime_us_ = utime_us;
+  }
+  pacer_.MarkTracked(frame);
+  last_progress_us_ = now_us;
+}
+
+CameraSession::State CameraSession::Look(int64_t now_us) {
+  if (has_ended_) return State::kEnded;
+  if (next_ && next_->id <= tracked_) PassOverTracked();
+  if (!next_) return is_exhausted_ ? State::kAtEnd : State::kMustRead;
+  return pacer_.MayGo(next_->utime_us, now_us) ? State::kReady : State::kWaits;
+}
+
+void CameraSession::PassOverTracked() {
+  if (source_->is_live()) {
+    renumbering_.MoveBehind(tracked_, tracked_utime_us_, *next_);
+    return;
+  }
+  source_->SkipTo({tracked_.value + 1});
+  next_.reset();
+  pacer_.RestartClock();
+}
+
+void CameraSession::Read() {
+  try {
+    next_ = source_->Next();
+  } catch (const InputError&) {
+    has_ended_ = true;
+    throw;
+  }
+  is_exhausted_ = !next_;
+  if (next_) renumbering_.Apply(*next_);
+}
+
+CameraSession::Shipment CameraSession::Send(int64_t now_us) {
+  Shipment shipment{TruthsUpTo(next_->id), std::move(*next_)};
+  next_.reset();
+  last_sent_ = shipment.frame.id;
+  pacer_.MarkSent(last_sent_);
+  last_progress_us_ = now_us;
+  ++num_sent_;
+  return shipment;
+}
+
+std::vector<GroundTruthPose> CameraSession::TruthsUpTo(FrameId frame) {
+  const std::vector<GroundTruthPose>& all = source_->ground_truth();
+  std::vector<GroundTruthPose> truths;
+  for (; num_truths_sent_ < all.size() && all[num_truths_sent_].frame <= frame; ++num_truths_sent_) {
+    truths.push_back(all[num_truths_sent_]);
+  }
+  return truths;
+}
+
+std::optional<CameraSession::Ending> CameraSession::End() {
+  if (has_ended_) return std::nullopt;
+  has_ended_ = true;
+  last_sent_ = std::max(last_sent_, tracked_);
+  return Ending{TruthsUpTo(last_sent_), {.stage = StageKind::kCamera, .num_frames = last_sent_.value + 1}};
+}
+
+std::optional<std::string> CameraSession::Watch(int64_t now_us) {
+  const bool was_stuck = is_stuck_;
+  is_stuck_ = !has_ended_ && pacer_.num_ahead() > 0 && now_us - last_progress_us_ > kNoPoseUs;
+  if (!is_stuck_ || was_stuck) return std::nullopt;
+  return "no pose has come for 10 s, and in lockstep frame " + std::to_string(last_sent_.value + 1) +
+         " waits for one: is the rest of the stack running?";
+}
+
+}  // namespace tessera

@@ -1,0 +1,81 @@
+// What the camera does with its source and with the poses that come back: which frame is sent, with which number, and
+// when. No bus, and the time is told.
+//
+//   kMustRead  Read() reads the next frame ahead, so that decoding it delays nobody
+//   kWaits     the frame that was read may not go yet (pacer.h)
+//   kReady     Send() sends it
+//   kAtEnd     the source has no more frames: End() ends the stream
+//   kEnded     the stream has ended, or broke off
+//
+// A camera that was started again learns from POSE what is tracked, and continues behind it: what was on its way is
+// sent once more. A recorded source keeps its numbers; a live one gets higher ones (renumbering.h).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "datasets/frame_source.h"
+#include "datasets/pacer.h"
+#include "datasets/renumbering.h"
+#include "messages/end_of_stream.h"
+
+namespace tessera {
+
+class CameraSession {
+ public:
+  enum class State { kMustRead, kWaits, kReady, kAtEnd, kEnded };
+  struct Shipment {
+    std::vector<GroundTruthPose> truths;  // up to this frame, to be sent first
+    CameraFrame frame;
+  };
+  struct Ending {
+    std::vector<GroundTruthPose> truths;
+    EndOfStream end;
+  };
+
+  // `num_on_the_way`: frames that the dispatcher can have taken, beyond the last one tracked.
+  CameraSession(std::unique_ptr<FrameSource> source, const PacerOptions& pace, int64_t num_on_the_way, int64_t now_us);
+
+  const FrameSource& source() const { return *source_; }
+  // This frame, taken at `utime_us`, and all before it, have a pose.
+  void MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
+  // The state now; passes over what is tracked.
+  State Look(int64_t now_us);
+  // Needs kMustRead. Throws InputError at a damaged image: the stream has broken off then, and gets no end.
+  void Read();
+  // Needs kReady.
+  Shipment Send(int64_t now_us);
+  // Ends the stream, here if need be; nullopt if it has ended.
+  std::optional<Ending> End();
+  // One sentence when lockstep has waited for a pose for too long, once each time. To be called once a second.
+  std::optional<std::string> Watch(int64_t now_us);
+
+  int num_ahead() const { return pacer_.num_ahead(); }
+  int64_t num_sent() const { return num_sent_; }
+
+  // Without a pose for this long, lockstep asks for help: the slowest pipeline tracks a frame in less.
+  static constexpr int64_t kNoPoseUs = 10'000'000;
+
+ private:
+  void PassOverTracked();
+  std::vector<GroundTruthPose> TruthsUpTo(FrameId frame);
+
+  std::unique_ptr<FrameSource> source_;
+  Pacer pacer_;
+  Renumbering renumbering_;          // of a live source
+  std::optional<CameraFrame> next_;  // read and not yet sent
+  bool is_exhausted_ = false;
+  size_t num_truths_sent_ = 0;
+  int64_t num_sent_ = 0;
+  FrameId last_sent_;
+  FrameId tracked_;  // this frame, and all before it, have a pose
+  int64_t tracked_utime_us_ = 0;
+  int64_t last_progress_us_;  // when a frame was last sent or a pose last came
+  bool has_ended_ = false;
+  bool is_stuck_ = false;
+};
+
+}  // namespace tessera
