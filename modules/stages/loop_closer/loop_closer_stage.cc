@@ -3,6 +3,8 @@
 #include <string>
 #include <variant>
 
+#include "core/errors.h"
+#include "core/project_file.h"
 #include "core/session_actions.h"
 
 namespace tessera {
@@ -23,7 +25,10 @@ LoopCloserSessionOptions OptionsFrom(const Settings& settings) {
 
 std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
   const std::string path = settings.Get<LoopCloserSettings>().vocabulary;
-  return Vocabulary::Load(path.empty() ? TESSERA_VOCABULARY : path);
+  if (!path.empty()) return Vocabulary::Load(path);
+  const auto shipped = FindProjectFile("config/vocabulary.tvoc");
+  if (!shipped) throw InputError("no folder above this program holds config/vocabulary.tvoc; set loop_closer.vocabulary");
+  return Vocabulary::Load(*shipped);
 }
 
 }  // namespace
