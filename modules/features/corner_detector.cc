@@ -26,7 +26,7 @@ struct Ring {
   ptrdiff_t offsets[16];
 };
 
-// The largest of the 16 minima over 9 neighbours each, for the values d[0..15] around the ring.
+// The largest of the 16 minima over 9 neighbors each, for the values d[0..15] around the ring.
 // Arcs k .. k + 8 and k + 1 .. k + 9 share the eight values k + 1 .. k + 8.
 inline U8x32 BestArc(const U8x32* d) {
   U8x32 pairs[8];
@@ -41,7 +41,7 @@ inline U8x32 BestArc(const U8x32* d) {
   return best;
 }
 
-// Upper bound of BestArc by the four pixels right, left, above and below: nine neighbours hold two of them in sequence.
+// Upper bound of BestArc by the four pixels right, left, above and below: nine neighbors hold two of them in sequence.
 inline U8x32 ArcBound(U8x32 below, U8x32 right, U8x32 above, U8x32 left) {
   return Min(Max(below, above), Max(right, left));
 }
@@ -49,13 +49,13 @@ inline U8x32 ArcBound(U8x32 below, U8x32 right, U8x32 above, U8x32 left) {
 // Scores of the 32 pixels from `p` on; 0 where lower than min_score (which may be left out as well where no pixel of
 // the 32 reaches it).
 inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
-  const U8x32 centre = simd::Load8(p);
+  const U8x32 center = simd::Load8(p);
   U8x32 brighter[16];
   U8x32 darker[16];
   const auto compare = [&](int i) {
     const U8x32 value = simd::Load8(p + ring.offsets[i]);
-    brighter[i] = SubtractSaturated(value, centre);
-    darker[i] = SubtractSaturated(centre, value);
+    brighter[i] = SubtractSaturated(value, center);
+    darker[i] = SubtractSaturated(center, value);
   };
   for (const int i : {0, 4, 8, 12}) compare(i);
   const U8x32 bound = Max(ArcBound(brighter[0], brighter[4], brighter[8], brighter[12]),

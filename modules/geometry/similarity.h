@@ -60,7 +60,7 @@ std::optional<SimilarityEstimate> EstimateSimilarity(const CameraCalibration& ca
                                                      std::span<const PointPair> pairs, uint64_t seed,
                                                      const SimilarityOptions& options);
 
-// Minimises over S = first_from_second, by Levenberg-Marquardt over 7 or 6 degrees of freedom,
+// Minimizes over S = first_from_second, by Levenberg-Marquardt over 7 or 6 degrees of freedom,
 //
 //   1/2 sum_i rho(e1' W1 e1) + rho(e2' W2 e2) + rho(d^2)
 //

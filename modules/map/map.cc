@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 // The hash of a map is the sum (modulo 2^64) of the hashes of its facts, so that it follows each change at once and
-// does not depend on the order of changes. A fact's hash mixes its words by the finaliser of SplitMix64 (Steele et al.
+// does not depend on the order of changes. A fact's hash mixes its words by the finalizer of SplitMix64 (Steele et al.
 // 2014).
 class FactHash {
  public:

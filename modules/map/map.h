@@ -29,7 +29,7 @@ struct Observation {
 
 // A landmark (map point) as the mapper estimated it.
 struct Landmark {
-  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // metres (mono: units of the map)
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // meters (mono: units of the map)
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // mean unit direction from the landmark to the cameras that saw it
   double min_distance = 0.0;                         // between these distances from a camera its scale fits the pyramid
   double max_distance = 0.0;

@@ -40,7 +40,7 @@ void RemovedKeyframes::Remember(const Map& map, KeyframeId id) {
   }
 }
 
-void RemovedKeyframes::Add(const KeyframeTie& tie) {
+void RemovedKeyframes::Add(const KeyframeLink& tie) {
   for (KeyframeId id = tie.parent; id != tie.keyframe; id = ties_.at(id).parent) {
     if (ties_.contains(id)) continue;
     ties_.try_emplace(tie.keyframe, tie.parent, tie.parent_from_keyframe);
@@ -63,11 +63,11 @@ KeyframeId RemovedKeyframes::Successor(const Map& map, KeyframeId id) const {
   return id;
 }
 
-void KeyframePlaces::Begin(const Map& map) {
+void KeyframePoses::Begin(const Map& map) {
   map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) { Set(map, id); });
 }
 
-RemovedInDelta KeyframePlaces::Update(const MapDelta& delta, const Map& map) {
+RemovedInDelta KeyframePoses::Update(const MapDelta& delta, const Map& map) {
   RemovedInDelta removed{delta.number, {}};
   for (const KeyframeId id : delta.removed_keyframes) Tie(id, &removed);
   for (const KeyframeId id : delta.removed_keyframes) places_.erase(id);
@@ -77,22 +77,22 @@ RemovedInDelta KeyframePlaces::Update(const MapDelta& delta, const Map& map) {
   return removed;
 }
 
-void KeyframePlaces::Set(const Map& map, KeyframeId id) {
+void KeyframePoses::Set(const Map& map, KeyframeId id) {
   if (const Keyframe* keyframe = map.FindKeyframe(id)) places_[id] = {keyframe->parent, keyframe->WorldFromKeyframe()};
 }
 
 // As RemovedKeyframes::Remember does.
-void KeyframePlaces::Tie(KeyframeId id, RemovedInDelta* removed) {
+void KeyframePoses::Tie(KeyframeId id, RemovedInDelta* removed) {
   const auto place = places_.find(id);
   if (place == places_.end()) return;
   if (const std::optional<Sim3> world_from_parent = Find(place->second.parent)) {
-    const KeyframeTie tie{id, place->second.parent, world_from_parent->Inverse() * place->second.world_from_keyframe};
+    const KeyframeLink tie{id, place->second.parent, world_from_parent->Inverse() * place->second.world_from_keyframe};
     ties_[id] = tie;
     removed->ties.push_back(tie);
   }
 }
 
-std::optional<Sim3> KeyframePlaces::Find(KeyframeId id) const {
+std::optional<Sim3> KeyframePoses::Find(KeyframeId id) const {
   return FollowTies(ties_, id, [&](KeyframeId ancestor) -> std::optional<Sim3> {
     const auto place = places_.find(ancestor);
     return place == places_.end() ? std::nullopt : std::optional(place->second.world_from_keyframe);

@@ -11,7 +11,7 @@
 namespace tessera {
 
 // A keyframe that is no longer in the map, and where it stood.
-struct KeyframeTie {
+struct KeyframeLink {
   KeyframeId keyframe;
   KeyframeId parent;  // may be gone too
   Sim3 parent_from_keyframe;
@@ -20,7 +20,7 @@ struct KeyframeTie {
 // What the delta with this number removed, as those who followed the map then remember it (REMOVED_KEYFRAMES).
 struct RemovedInDelta {
   int64_t delta = 0;
-  std::vector<KeyframeTie> ties;
+  std::vector<KeyframeLink> ties;
 };
 
 class RemovedKeyframes {
@@ -32,7 +32,7 @@ class RemovedKeyframes {
   // Ties one keyframe of the map to its parent.
   void Remember(const Map& map, KeyframeId id);
   // What was removed when nobody here followed the map. What is remembered already stays; ties in a circle are ignored.
-  void Add(const KeyframeTie& tie);
+  void Add(const KeyframeLink& tie);
 
   // Keyframe::WorldFromKeyframe of one that is in the map or has been there; nullopt of one that never was.
   std::optional<Sim3> Find(const Map& map, KeyframeId id) const;
@@ -49,7 +49,7 @@ class RemovedKeyframes {
 
 // The owner's memory of where keyframes stood before its last delta, from which it tells what followers remember, to
 // the last bit: 100 bytes for each keyframe.
-class KeyframePlaces {
+class KeyframePoses {
  public:
   // `map`: the owner's, with which it begins.
   void Begin(const Map& map);
@@ -66,7 +66,7 @@ class KeyframePlaces {
   std::optional<Sim3> Find(KeyframeId id) const;
 
   std::map<KeyframeId, Place> places_;
-  std::map<KeyframeId, KeyframeTie> ties_;
+  std::map<KeyframeId, KeyframeLink> ties_;
 };
 
 }  // namespace tessera

@@ -11,10 +11,10 @@ namespace tessera {
 KeyframeId RootOf(const Map& map, KeyframeId id);
 
 // All keyframes of that part, by id.
-std::vector<KeyframeId> PartOf(const Map& map, KeyframeId id);
+std::vector<KeyframeId> MapPartOf(const Map& map, KeyframeId id);
 
 // Makes `id` the child of `parent`, a keyframe of another tree, and turns its own tree round, so that all of it hangs
 // below `id`.
-void HangBelow(KeyframeId id, KeyframeId parent, MapEditor& editor);
+void AttachTree(KeyframeId id, KeyframeId parent, MapEditor& editor);
 
 }  // namespace tessera

@@ -63,7 +63,7 @@ std::vector<KeypointPair> MatchByBags(const FeatureFrame& first, const BagOfWord
     pairs.push_back({i, j});
     turns.push_back(static_cast<uint8_t>(second.keypoints[Index(j)].angle - first.keypoints[Index(i)].angle));
   }
-  const std::vector<char> agrees = AgreeingTurns(turns);
+  const std::vector<char> agrees = RotationHistogramInliers(turns);
   std::vector<KeypointPair> kept;
   for (size_t k = 0; k < pairs.size(); ++k) {
     if (agrees[k]) kept.push_back(pairs[k]);

@@ -19,7 +19,7 @@ std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::
       matches.push_back({i, best.index, best.distance});
     }
   }
-  return DropUnlikeTurns(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
+  return KeepRotationInliers(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
 }
 
 std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second) {
@@ -40,7 +40,7 @@ std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second)
   return kept;
 }
 
-std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& first, const FrameView& second,
+std::vector<Match> KeepRotationInliers(std::vector<Match> matches, const FrameView& first, const FrameView& second,
                                    const MatchingOptions& options) {
   if (!options.check_rotation) {
     return matches;
@@ -50,7 +50,7 @@ std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& 
   for (const Match& match : matches) {
     turns.push_back(static_cast<uint8_t>(second.keypoint(match.second).angle - first.keypoint(match.first).angle));
   }
-  const std::vector<char> agrees = AgreeingTurns(turns);
+  const std::vector<char> agrees = RotationHistogramInliers(turns);
   size_t kept = 0;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (agrees[i]) {
@@ -61,13 +61,13 @@ std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& 
   return matches;
 }
 
-std::vector<char> AgreeingTurns(std::span<const uint8_t> turns) {
+std::vector<char> RotationHistogramInliers(std::span<const uint8_t> turns) {
   constexpr int kSectors = 32, kSectorSize = 256 / kSectors;
   std::array<int, kSectors> count{};
   for (const uint8_t turn : turns) {
     ++count[turn / kSectorSize];
   }
-  // The fullest sector together with its two neighbours, since the peak may lie on a border.
+  // The fullest sector together with its two neighbors, since the peak may lie on a border.
   int best = 0, best_count = -1;
   for (int sector = 0; sector < kSectors; ++sector) {
     const auto at = [&](int s) { return count[static_cast<size_t>((s + kSectors) % kSectors)]; };

@@ -49,13 +49,13 @@ struct BestMatch {
 // Keeps, of matches that share their `second`, the one with the lowest distance (then the lowest `first`).
 std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second);
 
-// Keeps the matches whose turn, angle of `second` less that of `first`, agrees (AgreeingTurns), if the options ask for
+// Keeps the matches whose turn, angle of `second` less that of `first`, agrees (RotationHistogramInliers), if the options ask for
 // it.
-std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& first, const FrameView& second,
+std::vector<Match> KeepRotationInliers(std::vector<Match> matches, const FrameView& first, const FrameView& second,
                                    const MatchingOptions& options);
 
-// Marks the turns (1/256 turn each) that lie in the three neighbouring sectors, of 32, that hold most of them: images
+// Marks the turns (1/256 turn each) that lie in the three neighboring sectors, of 32, that hold most of them: images
 // turn as a whole, so wrong matches stand out.
-std::vector<char> AgreeingTurns(std::span<const uint8_t> turns);
+std::vector<char> RotationHistogramInliers(std::span<const uint8_t> turns);
 
 }  // namespace tessera

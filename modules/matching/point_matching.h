@@ -21,7 +21,7 @@ struct MatchOptions {
   Result<> Check() const;
 };
 
-using PlacedPoints = std::vector<std::pair<PointId, Landmark>>;  // in world coordinates
+using KnownPoints = std::vector<std::pair<PointId, Landmark>>;  // in world coordinates
 
 // A point that a frame sees.
 struct SeenPoint {
@@ -49,9 +49,9 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
 
 // Known points that `frame` sees none of yet, looked for around their projection at its pose. Adds to frame.points;
 // returns how many.
-int MatchLocal(const PlacedPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame);
+int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame);
 
 // Known points, wherever they may stand, by descriptor alone. Sets frame.points; returns how many.
-int MatchAnywhere(const PlacedPoints& points, const MatchOptions& options, TrackedFrame& frame);
+int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, TrackedFrame& frame);
 
 }  // namespace tessera

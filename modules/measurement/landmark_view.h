@@ -33,7 +33,7 @@ struct View {
 struct ExpectedView {
   Eigen::Vector2d pixel_px;
   double depth = 0.0;      // z in the camera frame
-  double distance = 0.0;   // from the camera's centre
+  double distance = 0.0;   // from the camera's center
   int level = 0;           // where its patch has the size that it had before
   double cos_angle = 1.0;  // between the line of sight and the landmark's mean one
 };

@@ -25,7 +25,7 @@ void NormalizeDepth(MonoStart& start) {
 
 Result<> InitializerOptions::Check() const {
   if (!(radius_share > 0.0) || min_matches < 8 || max_frames < 1) {
-    return Failed("the options of mono initialisation must be positive, and min_matches at least 8");
+    return Failed("the options of mono initialization must be positive, and min_matches at least 8");
   }
   return two_view.Check();
 }

@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 
 namespace tessera {
 namespace {
@@ -33,7 +33,7 @@ std::vector<KeyframeId> LocalKeyframes(const Map& map, const TrackedFrame& frame
   return keyframes;
 }
 
-PlacedPoints LocalPoints(const MapReplica& replica, const TrackedFrame& frame, int max_keyframes) {
+KnownPoints LocalPoints(const MapReplica& replica, const TrackedFrame& frame, int max_keyframes) {
   const Map& map = replica.map();
   std::vector<PointId> seen;
   for (const SeenPoint& point : frame.points) {
@@ -41,7 +41,7 @@ PlacedPoints LocalPoints(const MapReplica& replica, const TrackedFrame& frame, i
   }
   std::sort(seen.begin(), seen.end());
   const auto is_seen = [&](const PointId& point) { return std::binary_search(seen.begin(), seen.end(), point); };
-  PlacedPoints points;
+  KnownPoints points;
   for (const LandmarkId id : LandmarksSeenBy(map, LocalKeyframes(map, frame, max_keyframes))) {
     const PointId point{id, {}, -1};
     if (!is_seen(point)) points.emplace_back(point, *map.FindLandmark(id));

@@ -14,6 +14,6 @@ std::vector<KeyframeId> LocalKeyframes(const Map& map, const TrackedFrame& frame
 
 // The landmarks of the local keyframes, and the points of keyframes that were not answered yet, that the frame does not
 // see.
-PlacedPoints LocalPoints(const MapReplica& replica, const TrackedFrame& frame, int max_keyframes);
+KnownPoints LocalPoints(const MapReplica& replica, const TrackedFrame& frame, int max_keyframes);
 
 }  // namespace tessera

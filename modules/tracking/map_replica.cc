@@ -11,7 +11,7 @@ Result<> MapReplica::Apply(const MapDelta& delta) {
   return applied;
 }
 
-std::optional<Sim3> MapReplica::PlaceOf(KeyframeId id) const {
+std::optional<Sim3> MapReplica::WorldFromKeyframe(KeyframeId id) const {
   Sim3 ancestor_from_keyframe;
   for (auto sent = sent_.find(id); sent != sent_.end(); sent = sent_.find(id)) {
     ancestor_from_keyframe = Sim3::From(sent->second.reference_from_camera) * ancestor_from_keyframe;
@@ -31,7 +31,7 @@ std::optional<Landmark> MapReplica::Find(const PointId& id) const {
   const auto sent = sent_.find(id.keyframe);
   if (sent == sent_.end()) return std::nullopt;
   const auto point = sent->second.points.find(id.keypoint);
-  const std::optional<Sim3> place = PlaceOf(id.keyframe);
+  const std::optional<Sim3> place = WorldFromKeyframe(id.keyframe);
   if (point == sent->second.points.end() || !place) return std::nullopt;
   return InWorld(*place, point->second);
 }
@@ -46,7 +46,7 @@ PointId MapReplica::Renew(const PointId& id) const {
 std::vector<std::pair<PointId, Landmark>> MapReplica::SentPoints() const {
   std::vector<std::pair<PointId, Landmark>> points;
   for (const auto& [id, keyframe] : sent_) {
-    const std::optional<Sim3> place = PlaceOf(id);
+    const std::optional<Sim3> place = WorldFromKeyframe(id);
     if (!place) continue;
     for (const auto& [keypoint, point] : keyframe.points) {
       points.emplace_back(PointId{{}, id, keypoint}, InWorld(*place, point));

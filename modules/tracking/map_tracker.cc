@@ -151,7 +151,7 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
 // The map may have changed: the last frame keeps its pose relative to its reference, and its points move with the map.
 void MapTracker::UpdateLast() {
   decision_.Renew(replica_);
-  if (const std::optional<Sim3> world_from_reference = replica_.PlaceOf(reference_)) {
+  if (const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_)) {
     last_->frame.world_from_camera = (*world_from_reference * last_->reference_from_camera).Pose();
   }
   for (SeenPoint& point : last_->frame.points) {
@@ -177,14 +177,14 @@ bool MapTracker::Localize(const Frame& view) {
   return true;
 }
 
-PlacedPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
+KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
   return LocalPoints(replica_, frame, options_.max_local_keyframes);
 }
 
 bool MapTracker::FollowLast(TrackedFrame& frame) const {
   const Rigid3 last_from_current = current_from_last_.value_or(Rigid3::Identity()).Inverse();
   const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
-  const Sim3 world_from_reference = replica_.PlaceOf(reference_).value_or(Sim3{});
+  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
   for (const double widening : {1.0, 2.0, 4.0}) {
     frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
     const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
@@ -196,7 +196,7 @@ bool MapTracker::FollowLast(TrackedFrame& frame) const {
 
 // Without a predicted pose: the points around the last frame, matched by descriptor alone.
 bool MapTracker::Relocalize(TrackedFrame& frame) const {
-  PlacedPoints points = PointsAround(last_->frame);
+  KnownPoints points = PointsAround(last_->frame);
   for (const SeenPoint& point : last_->frame.points) {
     if (point.valid()) points.emplace_back(point.id, point.landmark);
   }
@@ -218,7 +218,7 @@ bool MapTracker::Relocalize(TrackedFrame& frame) const {
 // this map.
 bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& view) {
   const Frame asked = view->features().frame == answer.frame ? view : asked_;
-  const std::optional<Sim3> world_from_reference = replica_.PlaceOf(answer.reference);
+  const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(answer.reference);
   if (!world_from_reference || asked == nullptr || asked->features().frame != answer.frame) return false;
   TrackedFrame frame(asked);
   frame.world_from_camera = (*world_from_reference * answer.reference_from_camera).Pose();
@@ -240,7 +240,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
 }
 
 void MapTracker::Remember(TrackedFrame frame) {
-  const Sim3 reference_from_world = replica_.PlaceOf(reference_).value_or(Sim3{}).Inverse();
+  const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   current_from_last_.reset();
   if (!lost_since_us_) current_from_last_ = reference_from_camera.Inverse() * last_->reference_from_camera;
@@ -269,7 +269,7 @@ bool MapTracker::IsKeyframeDue() {
     if (!point || point->z() > near_m) continue;
     (frame.points[Index(i)].valid() ? near.num_known : near.num_new) += 1;
   }
-  const Rigid3 world_from_reference = replica_.PlaceOf(reference_).value_or(Sim3{}).Pose();
+  const Rigid3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Pose();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
   const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near);
   return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;
@@ -289,7 +289,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
     const SeenPoint& point = frame.points[i];
     keyframe.landmarks[i] = point.id.landmark;
     if (point.id.keyframe.valid()) {
-      const Sim3 other_from_world = replica_.PlaceOf(point.id.keyframe).value_or(Sim3{}).Inverse();
+      const Sim3 other_from_world = replica_.WorldFromKeyframe(point.id.keyframe).value_or(Sim3{}).Inverse();
       keyframe.shared.push_back({static_cast<int32_t>(i), point.id.keyframe, point.id.keypoint,
                                  other_from_world * point.landmark.position_in_world});
     }
@@ -298,7 +298,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   // Points that one view alone placed are no measure of what should be seen again, unless there are no others.
   const bool has_known_points = frame.NumPoints() > 0;
   if (has_known_points) decision_.Restart(frame);
-  PlaceDepthPoints(frame, keyframe.id, sent);
+  AddDepthPoints(frame, keyframe.id, sent);
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
@@ -308,7 +308,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
 }
 
 // Until the mapper answers, near keypoints with depth are points of their own.
-void MapTracker::PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const {
+void MapTracker::AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const {
   const double max_depth_m = options_.max_depth_baselines * frame.view->baseline_m();
   for (int i = 0; i < frame.view->size(); ++i) {
     if (frame.points[Index(i)].valid()) continue;

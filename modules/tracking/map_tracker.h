@@ -94,12 +94,12 @@ class MapTracker {
   bool Localize(const Frame& view);
   bool FollowLast(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
-  PlacedPoints PointsAround(const TrackedFrame& frame) const;
+  KnownPoints PointsAround(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
-  void PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
+  void AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
 
   const MapTrackerOptions options_;
   MapReplica replica_;

@@ -166,7 +166,7 @@ struct Codec<RemovedInDelta> {
     std::string problem =
         SentenceUnless(message.delta >= 0 && message.delta == removed->delta, "its delta is out of range");
     for (size_t i = 0; problem.empty() && i < static_cast<size_t>(message.num_ties); ++i) {
-      KeyframeTie& tie = removed->ties.emplace_back();
+      KeyframeLink& tie = removed->ties.emplace_back();
       tie.keyframe.value = message.ties[i].keyframe;
       tie.parent.value = message.ties[i].parent;
       problem = FirstProblem({SentenceUnless(tie.parent.valid() && tie.keyframe.valid(), "a keyframe is out of range"),

@@ -13,7 +13,7 @@ namespace {
 
 const Sim3 kBend{1.7, ExpSO3({0.3, -0.2, 0.9}), {4.0, -1.0, 2.0}};  // new_world_from_old_world
 
-Sim3 PlaceOf(int64_t id, double scale) {
+Sim3 WorldFromKeyframe(int64_t id, double scale) {
   const auto step = static_cast<double>(id);
   return Sim3::From({ExpSO3({0.1 * step, 0.05, -0.2 * step}), {step, 0.3 * step, 0.1}}, scale);
 }
@@ -23,7 +23,7 @@ Map Chain() {
   Map map;
   MapEditor editor(map);
   for (int64_t id = 0; id < 4; ++id) {
-    editor.AddKeyframe({id}, {id - 1}, PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)), PlainFeatures(id, 1));
+    editor.AddKeyframe({id}, {id - 1}, WorldFromKeyframe(id, 1.0 + 0.25 * static_cast<double>(id)), PlainFeatures(id, 1));
   }
   (void)editor.Finish({3});
   return map;
@@ -66,7 +66,7 @@ TEST(RemovedKeyframes, StandWhereTheyStoodWhileTheMapRests) {
   Remove(map, {{1}}, removed);
   for (int64_t id = 0; id < 4; ++id) {
     ASSERT_TRUE(removed.Find(map, {id}).has_value());
-    ExpectNear(*removed.Find(map, {id}), PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)));
+    ExpectNear(*removed.Find(map, {id}), WorldFromKeyframe(id, 1.0 + 0.25 * static_cast<double>(id)));
   }
   EXPECT_EQ(removed.Successor(map, {2}), KeyframeId{0});
   EXPECT_EQ(removed.Successor(map, {3}), KeyframeId{3});
@@ -86,7 +86,7 @@ TEST(RemovedKeyframes, GoAlongWhenTheMapIsBent) {
     }
     Bend(map, kBend);
     for (int64_t id = 1; id < 3; ++id) {
-      ExpectNear(*removed.Find(map, {id}), kBend * PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)));
+      ExpectNear(*removed.Find(map, {id}), kBend * WorldFromKeyframe(id, 1.0 + 0.25 * static_cast<double>(id)));
     }
   }
 }
@@ -96,12 +96,12 @@ TEST(RemovedKeyframes, OneThatCameLateIsToldTheSame) {
   for (const bool at_once : {false, true}) {
     Map map = Chain();
     RemovedKeyframes followed, told;
-    KeyframePlaces places;
+    KeyframePoses places;
     places.Begin(map);
     std::vector<std::vector<KeyframeId>> steps{{{2}}, {{1}}};
     if (at_once) steps = {{{1}, {2}}};
     for (const auto& ids : steps) {
-      for (const KeyframeTie& tie : places.Update(Remove(map, ids, followed), map).ties) told.Add(tie);
+      for (const KeyframeLink& tie : places.Update(Remove(map, ids, followed), map).ties) told.Add(tie);
       MapEditor editor(map);
       map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
         editor.MoveKeyframe(id, kBend * keyframe.WorldFromKeyframe());

@@ -33,8 +33,8 @@ struct NewFrame {
 };
 
 // All points of the world, as a map knows them that saw them at `step`.
-PlacedPoints AllPoints(const SyntheticWorld& world, double step) {
-  PlacedPoints points;
+KnownPoints AllPoints(const SyntheticWorld& world, double step) {
+  KnownPoints points;
   for (size_t i = 0; i < world.num_points(); ++i) {
     const SeenPoint known = world.Known(i, SyntheticWorld::Pose(step));
     points.emplace_back(known.id, known.landmark);
@@ -71,7 +71,7 @@ TEST(MatchLast, DescriptorsTooFarApartDoNotMatch) {
 
 TEST(MatchLocal, FindsThePointsOfTheMapAroundTheirProjection) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
-  const PlacedPoints points = AllPoints(world, 0.0);
+  const KnownPoints points = AllPoints(world, 0.0);
   NewFrame next(world, 1);
   const int num = MatchLocal(points, 3.0, {}, next.frame);
   EXPECT_GT(num, next.truth.NumPoints() * 8 / 10);
@@ -80,7 +80,7 @@ TEST(MatchLocal, FindsThePointsOfTheMapAroundTheirProjection) {
 
 TEST(MatchLocal, KeepsWhatTheFrameSeesAlready) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
-  const PlacedPoints points = AllPoints(world, 0.0);
+  const KnownPoints points = AllPoints(world, 0.0);
   NewFrame next(world, 1);
   const SeenPoint other = world.Known(0, next.pose);
   next.frame.points[5] = other;
@@ -90,7 +90,7 @@ TEST(MatchLocal, KeepsWhatTheFrameSeesAlready) {
 
 TEST(MatchLocal, TheRightColumnMustFitToo) {
   SyntheticWorld world(SensorType::kStereo);
-  const PlacedPoints points = AllPoints(world, 1.0);
+  const KnownPoints points = AllPoints(world, 1.0);
   FeatureFrame features = world.Take(1).features;
   for (Keypoint& keypoint : features.keypoints) keypoint.right_x_px = std::max(0.0F, keypoint.right_x_px - 40.0F);
   TrackedFrame frame(ViewOf(features));
@@ -100,7 +100,7 @@ TEST(MatchLocal, TheRightColumnMustFitToo) {
 
 TEST(MatchAnywhere, FindsPointsWithoutAPose) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
-  const PlacedPoints points = AllPoints(world, 0.0);
+  const KnownPoints points = AllPoints(world, 0.0);
   NewFrame next(world, 1);
   next.frame.world_from_camera = {ExpSO3({1.0, 2.0, 0.5}), {100.0, 0.0, 0.0}};
   const int num = MatchAnywhere(points, {}, next.frame);

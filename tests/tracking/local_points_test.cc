@@ -49,7 +49,7 @@ TEST_F(LocalPointsTest, NoMoreKeyframesThanAllowed) {
 }
 
 TEST_F(LocalPointsTest, ThePointsAreThoseThatTheFrameDoesNotSee) {
-  const PlacedPoints points = LocalPoints(replica_, *frame_, 30);
+  const KnownPoints points = LocalPoints(replica_, *frame_, 30);
   size_t num_of_last = 0;
   for (const auto& [id, landmark] : points) {
     EXPECT_FALSE(SeesLandmark(id.landmark));
@@ -62,7 +62,7 @@ TEST_F(LocalPointsTest, PointsOfUnansweredKeyframesAreAmongThem) {
   replica_.Send({10}, {{9}, Rigid3::Identity(), {{4, {.position_in_world = {0.0, 0.0, 5.0}}}}});
   const PointId sent{{}, {10}, 4};
   const auto has_sent = [&] {
-    const PlacedPoints points = LocalPoints(replica_, *frame_, 30);
+    const KnownPoints points = LocalPoints(replica_, *frame_, 30);
     return std::any_of(points.begin(), points.end(), [&](const auto& point) { return point.first == sent; });
   };
   EXPECT_TRUE(has_sent());

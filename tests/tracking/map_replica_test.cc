@@ -62,12 +62,12 @@ TEST(MapReplica, WhatIsOnItsWayHasTheUnitsOfItsReference) {
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
   replica.Send({3}, {{2}, kStep, {}});
   const Sim3 second = Sim3::From(kStep, 1.25) * kStep;
-  ExpectNear(replica.PlaceOf({2}).value(), second);
-  ExpectNear(replica.PlaceOf({3}).value(), second * kStep);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), second);
+  ExpectNear(replica.WorldFromKeyframe({3}).value(), second * kStep);
   const Landmark point = replica.Find({{}, {2}, 0}).value();
   EXPECT_LT((point.position_in_world - second * Eigen::Vector3d(0.5, 0.0, 4.0)).norm(), 1e-12);
   EXPECT_NEAR(point.max_distance, 1.25 * 8.0, 1e-12);
-  EXPECT_FALSE(replica.PlaceOf({4}).has_value());
+  EXPECT_FALSE(replica.WorldFromKeyframe({4}).has_value());
   EXPECT_FALSE(replica.Find({{}, {2}, 1}).has_value());
 }
 
@@ -76,10 +76,10 @@ TEST(MapReplica, BendingTakesAlongWhatIsOnItsWay) {
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
-  const Sim3 place = replica.PlaceOf({2}).value();
+  const Sim3 place = replica.WorldFromKeyframe({2}).value();
   const Landmark before = replica.Find({{}, {2}, 0}).value();
   ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
-  ExpectNear(replica.PlaceOf({2}).value(), kBend * place);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), kBend * place);
   const Landmark after = replica.Find({{}, {2}, 0}).value();
   EXPECT_LT((after.position_in_world - kBend * before.position_in_world).norm(), 1e-9);
   EXPECT_LT((after.normal - kBend.rotation * before.normal).norm(), 1e-12);
@@ -93,13 +93,13 @@ TEST(MapReplica, AReferenceThatIsCulledLeavesItsPlace) {
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {}});
-  const Sim3 place = replica.PlaceOf({2}).value();
+  const Sim3 place = replica.WorldFromKeyframe({2}).value();
   ASSERT_THAT(replica.Apply(owner.Edit([](MapEditor& editor) { editor.RemoveKeyframe({1}); })), IsSuccess());
   EXPECT_EQ(replica.map().FindKeyframe({1}), nullptr);
-  ExpectNear(replica.PlaceOf({2}).value(), place);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), place);
   ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
-  ExpectNear(replica.PlaceOf({1}).value(), kBend * Sim3::From(kStep, 1.25));
-  ExpectNear(replica.PlaceOf({2}).value(), kBend * place);
+  ExpectNear(replica.WorldFromKeyframe({1}).value(), kBend * Sim3::From(kStep, 1.25));
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), kBend * place);
 }
 
 // The mapper puts the keyframe where the replica took it to be.
@@ -109,7 +109,7 @@ TEST(MapReplica, TheAnswerTakesOver) {
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
   ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
-  const Sim3 place = replica.PlaceOf({2}).value();
+  const Sim3 place = replica.WorldFromKeyframe({2}).value();
   const Landmark point = replica.Find({{}, {2}, 0}).value();
   LandmarkId name;
   const MapDelta answer = owner.Edit(
@@ -121,7 +121,7 @@ TEST(MapReplica, TheAnswerTakesOver) {
       {2});
   ASSERT_THAT(replica.Apply(answer), IsSuccess());
   EXPECT_TRUE(replica.sent().empty());
-  ExpectNear(replica.PlaceOf({2}).value(), place);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), place);
   EXPECT_EQ(replica.Renew({{}, {2}, 0}).landmark, name);
   EXPECT_FALSE(replica.Renew({{}, {2}, 1}).valid());
   EXPECT_TRUE(replica.SentPoints().empty());

@@ -36,7 +36,7 @@ class MapperStage {
   std::deque<KeyframeObservation> waiting_;
   int64_t num_processed_ = 0;  // keyframes
   MapArchive archive_;
-  KeyframePlaces places_;
+  KeyframePoses places_;
   Publisher<MapDelta> deltas_;
   Publisher<MapSnapshotPage> pages_;
   Publisher<RemovedInDelta> removed_;
