@@ -66,8 +66,8 @@ inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
   return SubtractSaturated(Max(BestArc(brighter), BestArc(darker)), one);
 }
 
-// Where between the places -1 and 1 a parabola through three scores has its maximum, in 1/kCornerSubpixels, rounded to
-// nearest: (after - before) / (2 (2 best - before - after)); before and after <= best.
+// Where between the positions -1 and 1 a parabola through three scores has its maximum, in 1/kCornerSubpixels, rounded
+// to nearest: (after - before) / (2 (2 best - before - after)); before and after <= best.
 inline int8_t ParabolaMaximum(int before, int best, int after) {
   const int curvature = 2 * best - before - after;
   if (curvature == 0) return 0;
@@ -100,9 +100,9 @@ CornerDetector::Corner CornerDetector::CornerAt(const Rect& corners, int x, int 
 void CornerDetector::Insert(size_t cell, Corner corner) {
   Corner* const begin = &best_[cell * static_cast<size_t>(capacity_)];
   int& count = num_best_[cell];
-  Corner* place = begin + std::min(count, capacity_ - 1);
-  for (; place > begin && place[-1].score < corner.score; --place) *place = place[-1];
-  *place = corner;
+  Corner* slot = begin + std::min(count, capacity_ - 1);
+  for (; slot > begin && slot[-1].score < corner.score; --slot) *slot = slot[-1];
+  *slot = corner;
   count = std::min(count + 1, capacity_);
   if (count == capacity_) lowest_[cell] = begin[capacity_ - 1].score;
 }

@@ -43,7 +43,7 @@ class CornerDetector {
 
   int capacity_ = 0;
   std::vector<uint8_t> score_rows_[3];  // scores of three rows; corners.x stands at kRowRoom
-  std::vector<Corner> best_;            // capacity_ places for each cell of one row of cells, best first
+  std::vector<Corner> best_;            // capacity_ slots for each cell of one row of cells, best first
   std::vector<int> num_best_;           // how many of them are taken
   std::vector<uint8_t> lowest_;         // a corner must score more than this to enter the cell's list
 };

@@ -1,4 +1,4 @@
-// Which cells a tile answers for, and which pixels it needs for that: the one place that dispatcher and extractor agree
+// Which cells a tile answers for, and which pixels it needs for that: what dispatcher and extractor agree
 // on.
 //
 // Each level of the pyramid carries a fixed grid of cells over the pixels that are far enough from the image's border

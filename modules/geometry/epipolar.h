@@ -1,4 +1,4 @@
-// Two views of the same points: the matrices that tie them, and the camera motions that such a matrix allows.
+// Two views of the same points: the matrices that relate them, and the camera motions that such a matrix allows.
 // Points are rays with z = 1. The direction of a translation is all that two views tell: it has length 1.
 #pragma once
 

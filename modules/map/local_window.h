@@ -1,4 +1,4 @@
-// Which part of the map a local bundle adjustment works on.
+// The keyframes and landmarks that a local bundle adjustment works on.
 #pragma once
 
 #include <vector>
@@ -10,8 +10,8 @@ namespace tessera {
 struct LocalWindowOptions {
   int max_inner_keyframes = 12;   // poses that move
   int min_shared_landmarks = 15;  // a keyframe that shares fewer with the center is no neighbor (as in ORB-SLAM)
-  int max_outer_keyframes = 20;   // poses that hold the window in place; those that see most of its landmarks
-  // Outer poses move too, tied to their neighbors by the relative poses that they have, and see no points (the double
+  int max_outer_keyframes = 20;   // poses that constrain the window: those that see most of its landmarks
+  // Outer poses move too, constrained by their poses relative to their neighbors, and see no points (the double
   // window of Strasdat et al. 2011); else they stay, and see the window's points. stages/mapper/README.md has figures.
   bool is_double = false;
 

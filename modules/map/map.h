@@ -55,11 +55,11 @@ struct Keyframe {
   std::map<KeyframeId, int32_t> covisible;  // keyframes that share landmarks, and how many
 };
 
-// Two keyframes that see the same place, and by which the map was bent so that they agree.
+// Two keyframes that see the same place, by which the map was corrected.
 struct ClosedLoop {
   KeyframeId current;      // the one that came back
   KeyframeId matched;      // the older one
-  double scale = 1.0;      // mono: by which the surroundings of `current` were enlarged
+  double scale = 1.0;      // mono: factor by which the map around `current` was scaled
   int32_t num_points = 0;  // landmarks that both see
   bool operator==(const ClosedLoop&) const = default;
 };
@@ -93,7 +93,7 @@ struct MapDelta {
   };
 
   int64_t number = 0;        // counts from 0; a replica applies them in order
-  KeyframeId answers;        // the keyframe whose processing made this delta; its place in logical time
+  KeyframeId answers;        // the keyframe whose processing made this delta: its logical time
   bool is_snapshot = false;  // starts from the empty map, whatever the replica held
   std::vector<NewKeyframe> new_keyframes;
   std::vector<MovedKeyframe> moved_keyframes;

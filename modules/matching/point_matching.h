@@ -31,7 +31,7 @@ struct SeenPoint {
   bool valid() const { return id.valid(); }
 };
 
-// A frame under way: its features, its place, and by keypoint the points that it sees.
+// A frame that is being localized: its features, its pose, and by keypoint the points that it sees.
 struct TrackedFrame {
   explicit TrackedFrame(std::shared_ptr<const FrameView> frame_view)
       : view(std::move(frame_view)), points(static_cast<size_t>(view->size())) {}
@@ -51,7 +51,7 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
 // returns how many.
 int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame);
 
-// Known points, wherever they may stand, by descriptor alone. Sets frame.points; returns how many.
+// Known points, wherever they may be in the image, by descriptor alone. Sets frame.points; returns how many.
 int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, TrackedFrame& frame);
 
 }  // namespace tessera

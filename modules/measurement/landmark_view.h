@@ -17,7 +17,7 @@ std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe);
 // Their median; 1 if there are none.
 double MedianDepth(const Map& map, const Keyframe& keyframe);
 
-// The features' keypoints by place.
+// The features' keypoints by position.
 FeatureGrid MakeGrid(const FeatureFrame& features);
 
 // A camera at a pose, ready to project many landmarks.

@@ -16,7 +16,7 @@
 namespace tessera {
 
 struct InitializerOptions {
-  double radius_share = 0.1;  // search window: +- this share of the image's width around the place in the frame before
+  double radius_share = 0.1;  // search window: +- this share of the image's width around the position in the last frame
   int min_matches = 100;      // with fewer, the reference frame is given up for the newest one
   int max_frames = 40;        // so is one that is older than this
   MatchingOptions matching{50, 0.9, true};
@@ -52,7 +52,7 @@ class MonoInitializer {
 
   InitializerOptions options_;
   std::shared_ptr<const FrameView> reference_;
-  std::vector<Eigen::Vector2d> places_px_;  // by keypoint of the reference: where it was seen last
+  std::vector<Eigen::Vector2d> last_seen_px_;  // by keypoint of the reference
 };
 
 }  // namespace tessera

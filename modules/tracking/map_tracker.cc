@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-// A point placed from one view alone, in the frame of its camera; fields as in DescribeLandmark.
+// A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark.
 Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera) {
   Landmark point;
   const double distance = point_in_camera.norm();
@@ -295,7 +295,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
     }
   }
   SentKeyframe sent{reference, reference_from_camera, {}};
-  // Points that one view alone placed are no measure of what should be seen again, unless there are no others.
+  // Points that one view alone knows are no measure of what should be seen again, unless there are no others.
   const bool has_known_points = frame.NumPoints() > 0;
   if (has_known_points) decision_.Restart(frame);
   AddDepthPoints(frame, keyframe.id, sent);

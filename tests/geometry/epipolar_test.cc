@@ -73,7 +73,8 @@ TEST(SampsonDistance, IsTheDistanceFromTheNearestAllowedPair) {
   const Eigen::Vector3d line = essential * pair.first;
   const Eigen::Vector2d across = line.head<2>().normalized();
   pair.second.head<2>() += 1e-4 * across;
-  const double share = line.head<2>().norm() / std::hypot(line.head<2>().norm(), (essential.transpose() * pair.second).head<2>().norm());
+  const double share =
+      line.head<2>().norm() / std::hypot(line.head<2>().norm(), (essential.transpose() * pair.second).head<2>().norm());
   EXPECT_NEAR(std::abs(SampsonDistance(essential, pair)), 1e-4 * share, 1e-7);
 }
 

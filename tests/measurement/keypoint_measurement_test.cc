@@ -13,8 +13,8 @@ const Eigen::Vector3d kPoint(1.0, -0.5, 8.0);
 // One keypoint of the given level that shows kPoint.
 FeatureFrame FrameOf(SensorType sensor, uint8_t level = 0) {
   FeatureFrame frame;
-  frame.calibration = {.sensor = sensor, .width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500, .cx_px = 320,
-                       .cy_px = 240};
+  frame.calibration = {
+      .sensor = sensor, .width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500, .cx_px = 320, .cy_px = 240};
   frame.calibration.baseline_m = sensor == SensorType::kStereo ? 0.5 : 0.0;
   const Eigen::Vector2d pixel = frame.calibration.Project(kPoint);
   Keypoint keypoint{.x_px = static_cast<float>(pixel.x()), .y_px = static_cast<float>(pixel.y()), .level = level};

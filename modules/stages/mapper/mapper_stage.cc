@@ -54,7 +54,7 @@ MapperStage::MapperStage(StageContext& context)
   if (const auto path = context.settings().Get<std::string>("mapper.load_map"); !path.empty()) Load(path);
   deltas_ = context.Advertise(kMapDelta);
   removed_ = context.Advertise(kRemovedKeyframes);
-  if (mapper_.map().next_delta() > 0) removed_.Publish({.delta = mapper_.map().next_delta() - 1, .ties = {}});
+  if (mapper_.map().next_delta() > 0) removed_.Publish({.delta = mapper_.map().next_delta() - 1, .links = {}});
   pages_ = context.Advertise(kMapSnapshot);
   end_of_stream_ = context.Advertise(kEndOfStream);
   context.Subscribe(kKeyframe, [this](const KeyframeObservation& keyframe) { OnKeyframe(keyframe); });
