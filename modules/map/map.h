@@ -142,6 +142,12 @@ class Map {
   friend class MapEditor;  // the owner applies its edits one by one, and counts them as one delta
 
   Result<> ApplyLists(const MapDelta& delta);
+  Result<> AddKeyframe(const MapDelta::NewKeyframe& added);
+  Result<> MoveKeyframe(const MapDelta::MovedKeyframe& moved);
+  Result<> ChangeLandmark(const MapDelta::ChangedLandmark& changed);
+  Result<> ChangeParent(const MapDelta::ChangedParent& changed);
+  Result<> RemoveLandmark(LandmarkId id);
+  Result<> RemoveKeyframe(KeyframeId id);
   Result<> AddObservation(const MapDelta::ChangedObservation& change);
   Result<> RemoveObservation(const MapDelta::ChangedObservation& change);
   void CountShared(KeyframeId a, KeyframeId b, int change);
