@@ -30,9 +30,9 @@ Result<> MapTrackerOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(start.Check());
   TESSERA_RETURN_IF_FAILED(matching.Check());
   TESSERA_RETURN_IF_FAILED(keyframes.Check());
-  if (max_unanswered_keyframes < 2) return Failed("the tracker must send at least two keyframes without an answer");
-  if (min_inliers < 6 || max_local_keyframes < 1) return Failed("tracker.min_inliers must be at least 6");
-  return {};
+  TESSERA_RETURN_IF_FAILED(Require(max_unanswered_keyframes >= 2, "max_unanswered_keyframes must be at least 2"));
+  TESSERA_RETURN_IF_FAILED(Require(min_inliers >= 6, "min_inliers must be at least 6"));
+  return Require(max_local_keyframes >= 1, "max_local_keyframes must be at least 1");
 }
 
 MapTracker::MapTracker(const MapTrackerOptions& options)
@@ -97,7 +97,7 @@ bool MapTracker::CanAskFor(const FrameView& view) const {
   return has_map() && view.size() >= options_.min_relocalized_inliers;
 }
 
-// The frame is tracked: tells where the last frame, which it is, stands.
+// The frame was tracked, and is now the last one.
 void MapTracker::DescribePose(MapTrackingResult& result) {
   lost_since_us_.reset();
   result.pose.world_from_camera = last_->frame.world_from_camera;
@@ -137,10 +137,10 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   second.world_from_camera = world_from_start_ * first_from_second;
   SentKeyframe sent{{}, world_from_start_, {}};
   for (const MonoStart::Point& point : start->points) {
-    const Landmark placed = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
-    sent.points[point.keypoint_first] = placed;
+    const Landmark in_camera = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
+    sent.points[point.keypoint_first] = in_camera;
     second.points[Index(point.keypoint_second)] = {{{}, first_id, point.keypoint_first},
-                                                   InWorld(Sim3::From(world_from_start_), placed)};
+                                                   InWorld(Sim3::From(world_from_start_), in_camera)};
   }
   replica_.Send(first_id, std::move(sent));
   last_.emplace(Last{std::move(second), Rigid3::Identity()});
@@ -165,7 +165,7 @@ void MapTracker::UpdateLast() {
   }
 }
 
-// The frame becomes the last one, if it agrees with the map around that.
+// The frame becomes the last one if its pose can be found in the map around that one.
 bool MapTracker::Localize(const Frame& view) {
   TrackedFrame frame(view);
   const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalize(frame);
@@ -314,9 +314,9 @@ void MapTracker::AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe
     if (frame.points[Index(i)].valid()) continue;
     const auto point = PointFromDepth(frame.view->features(), i);
     if (!point || point->z() > max_depth_m) continue;
-    const Landmark placed = PointOf(*frame.view, i, *point);
-    sent.points[i] = placed;
-    frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), placed)};
+    const Landmark in_camera = PointOf(*frame.view, i, *point);
+    sent.points[i] = in_camera;
+    frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), in_camera)};
   }
 }
 

@@ -1,9 +1,9 @@
 // The tracker's step: one frame's features in, its pose and perhaps a keyframe out, in a map that the mapper owns and
 // that changes here by deltas. No bus, no clock.
 //
-// Points are matched around a constant-velocity prediction with the last frame's, then with the landmarks of the
-// keyframes around; after each, the pose is the one that explains the matches best. Between a keyframe and the delta
-// that answers it, the points that the tracker placed itself help out: mono's first ones, and near ones with depth.
+// The last frame's points are matched around a constant-velocity prediction, then the landmarks of the local keyframes;
+// after each, the pose is optimized over the matches. Between a keyframe and the delta that answers it, the points that
+// the tracker triangulated itself are used: mono's first ones, and near ones with depth.
 #pragma once
 
 #include <cstdint>
