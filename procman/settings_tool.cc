@@ -1,13 +1,12 @@
 // tessera-settings: writes all settings, with overrides, into one file that every process of a run reads. The launcher
 // uses it, so that a wrong key or value is found before anything starts. Exit status 2 and one sentence on bad input.
 #include <CLI/CLI.hpp>
-#include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "settings/settings.h"
 
 namespace {
@@ -19,23 +18,11 @@ struct Arguments {
   std::string out;
 };
 
-// A reader never sees half a file: it appears under its name when it is complete.
-void WriteWhole(const std::string& path, const std::string& text) {
-  const std::string unfinished = path + ".unfinished";
-  std::ofstream file(unfinished, std::ios::trunc);
-  file << text << std::flush;
-  std::error_code error;
-  if (file) std::filesystem::rename(unfinished, path, error);
-  if (!file || error) {
-    throw tessera::InputError("settings can't be written to " + path + ": check the folder and its free space");
-  }
-}
-
 void MergeSettings(const Arguments& arguments) {
   auto settings = tessera::Settings::LoadDefaults(arguments.defaults);
   for (const auto& file : arguments.files) settings.OverrideFromFile(file);
   for (const auto& assignment : arguments.assignments) settings.Override(assignment);
-  WriteWhole(arguments.out, settings.ToYaml());
+  tessera::WriteFile(arguments.out, settings.ToYaml());
 }
 
 }  // namespace

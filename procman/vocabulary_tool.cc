@@ -60,7 +60,7 @@ void Print(const Vocabulary& vocabulary) {
 }
 
 void Train(const Arguments& arguments) {
-  if (const std::string problem = arguments.vocabulary.Check(); !problem.empty()) throw InputError(problem);
+  ThrowIfFailed<InputError>(arguments.vocabulary.Check());
   ThrowIfFailed<InputError>(arguments.features.Check());
   const std::vector<std::vector<Descriptor>> images = CollectDescriptors(arguments);
   size_t num_descriptors = 0;

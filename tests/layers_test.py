@@ -13,7 +13,9 @@ LCM_HEADER = re.compile(r"^(lcm/|tessera/\w+_t\.hpp$|tessera/type_texts\.h$)")
 def layers() -> list[str]:
     """Bottom to top, from the list that the build itself follows."""
     text = (MODULES / "CMakeLists.txt").read_text()
-    return re.search(r"foreach\(module ([a-z_ \n]+)\)", text)[1].split()
+    match = re.search(r"foreach\(module ([a-z_ \n]+)\)", text)
+    assert match
+    return match[1].split()
 
 
 def sources() -> list[Path]:
@@ -98,5 +100,5 @@ def test_pure_modules_have_no_clock_and_no_threads() -> None:
 
 
 @pytest.mark.parametrize("line, header", [('#include "a/b.h"', "a/b.h"), ("  #  include <lcm/lcm.h>", "lcm/lcm.h")])
-def test_includes_are_recognised(line, header) -> None:
+def test_includes_are_recognized(line: str, header: str) -> None:
     assert INCLUDE.findall(line)[0][1] == header

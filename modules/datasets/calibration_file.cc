@@ -7,6 +7,7 @@
 #include <initializer_list>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "datasets/text_file.h"
 
 namespace tessera {
@@ -151,9 +152,7 @@ CameraRig LoadCalibrationFile(const std::string& path) {
     section.Complain("depth_unit_m", "must be positive");
   }
   const SensorType sensor = rig.right ? SensorType::kStereo : SensorType::kMono;
-  if (const std::string problem = rig.Check(sensor); !problem.empty()) {
-    throw InputError("calibration file " + path + ": " + problem);
-  }
+  ThrowIfFailed<InputError>(rig.Check(sensor), "calibration file " + path + ": ");
   return rig;
 }
 

@@ -1,12 +1,12 @@
-// Calibration files of one's own cameras (`--camera FILE.yaml`), such as config/cameras/example.yaml.
+// Calibration files that users write for their cameras (`--camera FILE.yaml`), such as config/cameras/example.yaml.
 //
-//   width_px: 752                  # image size; may be left out, then the first image decides
+//   width_px: 752                  # image size; optional: that of the first image
 //   height_px: 480
 //   fx_px: 458.654                 # pinhole
 //   fy_px: 457.296
 //   cx_px: 367.215
 //   cy_px: 248.375
-//   distortion: [k1, k2, p1, p2]   # radial-tangential (camera_rig.h); 4, 5 or 8 numbers; may be left out
+//   distortion: [k1, k2, p1, p2]   # radial-tangential (camera_rig.h); 4, 5 or 8 numbers; optional
 //   depth_unit_m: 0.001            # RGB-D: meters per count of the depth image
 //   baseline_m: 0.54               # stereo, images rectified already: distance of the cameras; if they are not:
 //   right:                         # the right camera: fx_px, fy_px, cx_px, cy_px, distortion, and

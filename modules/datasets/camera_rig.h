@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "geometry/camera.h"
 #include "geometry/rigid3.h"
 
@@ -25,8 +26,8 @@ struct PinholeCamera {
   double cy_px = 0.0;
   std::vector<double> distortion;  // k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
 
-  // Empty if all is well, else what is out of range.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // One camera, or a pair.
@@ -36,8 +37,8 @@ struct CameraRig {
   Rigid3 right_from_left;              // stereo: meters
   double depth_unit_m = 0.0;           // RGB-D: meters per count; 0: unknown
 
-  // Empty if all is well for this kind of sensor, else what is missing or out of range.
-  std::string Check(SensorType sensor) const;
+  // Fails if something that this kind of sensor needs is missing or out of range.
+  Result<> Check(SensorType sensor) const;
 };
 
 // A pair that is rectified already: the same pinhole twice, `baseline_m` apart.

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "datasets/calibration_file.h"
 #include "datasets/image_file.h"
 #include "datasets/pose_track.h"
@@ -66,9 +67,7 @@ Sensor ParseSensorFile(const YAML::Node& document, const std::string& path) {
   sensor.camera.cx_px = intrinsics[2];
   sensor.camera.cy_px = intrinsics[3];
   sensor.camera.distortion = Numbers(document["distortion_coefficients"], "distortion_coefficients", path);
-  if (const std::string problem = sensor.camera.Check(); !problem.empty()) {
-    throw InputError("file " + path + ": " + problem);
-  }
+  ThrowIfFailed<InputError>(sensor.camera.Check(), "file " + path + ": ");
   sensor.body_from_sensor = ReadBodyFromSensor(document, path);
   return sensor;
 }

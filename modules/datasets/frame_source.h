@@ -1,6 +1,6 @@
 // Where frames come from: folders of data sets, videos, cameras.
 //
-// A frame keeps the number that it has in its source, also when only some frames are asked for, so that frame
+// A frame keeps the number that it has in its source, also when only some frames are requested, so that frame
 // 100 of a sequence is frame 100 in every run, log and table. The first frame of a source is frame 0; for a
 // stereo or RGB-D source whose images are associated by time, pairs are counted.
 #pragma once
@@ -17,9 +17,9 @@ namespace tessera {
 
 struct SourceOptions {
   std::string source;                     // kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME
-  SensorType sensor = SensorType::kMono;  // mono takes the left images of a pair
-  std::string calibration_path;           // YAML (calibration_file.h), instead of the source's own; empty: its own
-  double depth_unit_m = 0.0;              // RGB-D: meters per count, instead of what the source says; 0: as it says
+  SensorType sensor = SensorType::kMono;  // mono uses the left images of a pair
+  std::string calibration_path;           // YAML (calibration_file.h), instead of the source's; empty: the source's
+  double depth_unit_m = 0.0;              // RGB-D: meters per count, instead of the source's; 0: the source's
   int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
   int64_t last_frame = -1;                // -1: to the end
 };
@@ -30,18 +30,17 @@ class FrameSource {
 
   // The camera of the frames: undistorted, rectified.
   virtual const CameraCalibration& calibration() const = 0;
-  // How many frames Next() will yield in all; nullopt if the source can't know.
+  // The number of frames that Next() will return; nullopt if unknown.
   virtual std::optional<int64_t> num_frames() const = 0;
-  // Poses of the left rectified camera at those wanted frames of which the source knows it, by frame number.
+  // Known poses of the left rectified camera at the wanted frames, by frame number.
   virtual const std::vector<GroundTruthPose>& ground_truth() const = 0;
   // The next frame; nullopt at the end. Throws InputError at an image that is damaged or of another size.
   virtual std::optional<CameraFrame> Next() = 0;
-  // Frames below this number are not needed any more. A source that has to read them on its way to the others yields
-  // them all the same.
+  // Frames below this number are no longer needed. A source that has to read them anyway returns them nonetheless.
   virtual void SkipTo(FrameId /*frame*/) {}
-  // Whether frames come by themselves and can't be made to wait.
+  // Whether frames come at their own pace and can't be delayed.
   virtual bool is_live() const = 0;
-  // What the user should know of how the source was read, one sentence each.
+  // Notes for the user about how the source was read, one sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
 };
 

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "datasets/text_file.h"
 
 namespace tessera {

@@ -1,5 +1,5 @@
 // Image files of data sets, in any format that OpenCV reads, checked for completeness: OpenCV itself fills
-// the missing part of a truncated JPEG or PNG with gray and says nothing.
+// the missing part of a truncated JPEG or PNG with gray without an error.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ GrayImage ReadGrayImage(const std::string& path);
 // The counts of a depth image file: one channel of 16 bits. Throws InputError as above.
 DepthImage ReadDepthImage(const std::string& path);
 
-// The image files in a folder, told by their extension, in order of their names; none if it does not exist.
+// The image files in a folder (by extension) in order of their names; none if it does not exist.
 std::vector<std::string> ListImages(const std::string& folder);
 
 // `path`, or the file of the same name with another image extension, whichever exists; empty if none does.

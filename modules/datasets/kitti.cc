@@ -68,9 +68,7 @@ CameraRig ReadCalibration(const std::string& path, SensorType sensor) {
   camera.cx_px = left[2];
   camera.fy_px = left[5];
   camera.cy_px = left[6];
-  if (const std::string problem = camera.Check(); !problem.empty()) {
-    throw InputError("file " + path + ", row P0: " + problem + "; repair the file");
-  }
+  ThrowIfFailed<InputError>(camera.Check(), "file " + path + ", row P0: ");
   if (sensor != SensorType::kStereo) {
     return {.left = camera};
   }

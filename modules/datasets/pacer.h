@@ -12,7 +12,7 @@ namespace tessera {
 
 struct PacerOptions {
   enum class Kind {
-    kFree,      // at once: a live source comes at its own pace, and a recorder takes all
+    kFree,      // at once: a live source has its own pace, and a recorder takes all frames
     kLockstep,  // as fast as poses come back
     kTimed,     // by the source's timestamps
   };
@@ -28,12 +28,12 @@ class Pacer {
  public:
   explicit Pacer(const PacerOptions& options) : options_(options) {}
 
-  // Whether the frame that was taken at `utime_us` may go. The first one asked about starts kTimed's clock.
+  // Whether the frame taken at `utime_us` may be sent. The first call starts the clock of kTimed.
   bool MayGo(int64_t utime_us, int64_t now_us);
   void MarkSent(FrameId frame);
   // This frame, and all before it, have a pose.
   void MarkTracked(FrameId frame);
-  // Frames are left out: the next one asked about starts kTimed's clock anew.
+  // After skipped frames: the next call of MayGo restarts the clock of kTimed.
   void RestartClock() { start_.reset(); }
 
   // Frames sent and not yet tracked; only kLockstep counts them.

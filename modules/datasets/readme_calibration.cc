@@ -28,7 +28,7 @@ std::optional<PinholeCamera> PinholeFromText(const std::string& text) {
   camera.fy_px = values["fy"];
   camera.cx_px = values["cx"];
   camera.cy_px = values["cy"];
-  return camera.Check().empty() ? std::optional(camera) : std::nullopt;
+  return camera.Check() ? std::optional(camera) : std::nullopt;
 }
 
 double DepthUnitFromText(const std::string& text) {

@@ -1,4 +1,4 @@
-// The calibration that the README of a data set tells people, for formats without one.
+// The calibration in the README of a data set, for formats without a calibration file.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@ namespace tessera {
 std::optional<PinholeCamera> PinholeFromText(const std::string& text);
 
 // Meters per count of depth images, from `factor N` (counts per meter; the first mention) or else the word
-// millimeters. 0: the text doesn't say.
+// millimeters. 0: the text names neither.
 double DepthUnitFromText(const std::string& text);
 
 }  // namespace tessera

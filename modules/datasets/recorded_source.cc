@@ -82,10 +82,8 @@ void RecordedSource::PrepareRectifier(const SourceOptions& options) {
       camera->height_px = first_left_.height;
     }
   }
-  if (const std::string problem = rig.Check(sensor_); !problem.empty()) {
-    throw InputError("the calibration of " + options.source + " does not do for --sensor " + ToString(sensor_) + ": " +
-                     problem);
-  }
+  ThrowIfFailed<InputError>(rig.Check(sensor_), "the calibration of " + options.source +
+                                                    " is not usable with --sensor " + ToString(sensor_) + ": ");
   RequireSize(first_left_.width, first_left_.height, rig.left.width_px, rig.left.height_px,
               "image " + recording_.left->Name(first_));
   rectifier_ = std::make_unique<Rectifier>(rig, sensor_);

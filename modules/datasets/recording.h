@@ -25,16 +25,16 @@ class ImageReader {
 };
 
 std::unique_ptr<ImageReader> ReadImageFiles(std::vector<std::string> paths);
-// The images of a video. `num_images`: how many are wanted if the container doesn't say how many there are.
+// The images of a video. `num_images`: how many to read if the container doesn't store their number.
 std::unique_ptr<ImageReader> ReadVideoImages(const std::string& path, int64_t num_images);
 
 struct Recording {
   std::vector<int64_t> utimes_us;             // by frame
-  std::string times_path;                     // the file that they stand in
+  std::string times_path;                     // the file that lists them
   std::unique_ptr<ImageReader> left;          // at least as many images as utimes_us
   std::unique_ptr<ImageReader> right;         // stereo
   std::vector<std::string> depth_paths;       // RGB-D: by frame
-  CameraRig rig;                              // image size may be left open
+  CameraRig rig;                              // image size may be 0: unknown
   std::vector<GroundTruthPose> ground_truth;  // of the left camera before rectification; by frame
   std::vector<std::string> notes;
 };

@@ -1,4 +1,4 @@
-// Numbers and times of a live source that was opened again: it counts from 0, and the run must go on.
+// Frame numbers and times of a live source that was reopened during a run: it counts from 0, the run continues.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@ namespace tessera {
 
 class Renumbering {
  public:
-  // `num_on_the_way`: frames that may have been sent and not tracked when the camera before this one died.
+  // `num_on_the_way`: frames that may have been sent and not tracked when the previous camera process ended.
   explicit Renumbering(int64_t num_on_the_way) : num_on_the_way_(num_on_the_way) {}
 
-  // What the source yields gets the number and time that it has in the run.
+  // Gives a frame of the source its number and time in the run.
   void Apply(CameraFrame& frame) const {
     frame.id.value += number_offset_;
     frame.utime_us += time_offset_us_;
   }
-  // Frame `tracked`, taken at `tracked_utime_us`, has a pose. If `frame` can't come after it, it and those to come are
-  // moved behind all that may be on its way; the numbers in between count as dropped.
+  // Frame `tracked`, taken at `tracked_utime_us`, has a pose. If `frame` has no higher number, it and all later ones
+  // are numbered after all frames that may be on their way; the numbers in between count as dropped.
   void MoveBehind(FrameId tracked, int64_t tracked_utime_us, CameraFrame& frame) {
     if (frame.id > tracked) return;
     const int64_t number_step = tracked.value + num_on_the_way_ + 1 - frame.id.value;
@@ -30,7 +30,7 @@ class Renumbering {
   }
 
  private:
-  // More than frames on their way and a restart take; how long it was is not known to a clock that began anew.
+  // Longer than frames on their way and a restart take; the restarted clock does not know the true time.
   static constexpr int64_t kMissedUs = 3'000'000;
 
   const int64_t num_on_the_way_;

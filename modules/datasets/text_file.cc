@@ -2,12 +2,10 @@
 
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/files.h"
 
 namespace tessera {
 namespace {
@@ -56,14 +54,6 @@ int64_t TextRow::Integer(size_t index) const {
                      "`, is not a whole number: repair the file");
   }
   return number;
-}
-
-std::string ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw InputError("file " + path + " can't be read: check that it exists and may be read");
-  }
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 std::vector<TextRow> ReadRows(const std::string& path) {

@@ -24,9 +24,6 @@ std::vector<TextRow> ReadRows(const std::string& path);
 // Whether the whole text is one finite number, and which.
 bool ParseNumber(const std::string& text, double& number);
 
-// All bytes of a file. Throws InputError if it can't be read.
-std::string ReadFile(const std::string& path);
-
 // Microseconds of a time in seconds, rounded to the nearest.
 int64_t MicrosecondsFromSeconds(double seconds);
 

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "datasets/calibration_file.h"
 #include "datasets/image_file.h"
 #include "datasets/pose_track.h"
@@ -116,7 +117,7 @@ std::string Describe(const PinholeCamera& camera) {
   return text.str();
 }
 
-// What the folder itself says of its camera, and where it says so, in the notes.
+// The camera according to the files of the folder; a note names the file.
 void CalibrateFromFolder(const fs::path& folder, const SourceOptions& options, Recording& recording) {
   CameraRig& rig = recording.rig;
   std::string file = options.calibration_path;

@@ -25,7 +25,7 @@ class VideoInput {
   // Passes over the next image; false at the end.
   bool Skip();
 
-  // Number of images as the container says; 0: unknown.
+  // Number of images according to the container; 0: unknown.
   int64_t num_images() const;
   // Images per second; 0: unknown.
   double frames_per_s() const;

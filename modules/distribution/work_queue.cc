@@ -13,14 +13,13 @@ size_t NumPixels(const TileJob& job) {
 
 }  // namespace
 
-std::string WorkQueueOptions::Check() const {
-  if (max_queued_frames < 1) return "dispatcher.max_queued_frames must be at least 1";
-  if (max_frames_in_flight < 1) return "dispatcher.max_frames_in_flight must be at least 1";
-  if (jobs_per_extractor < 1) return "dispatcher.jobs_per_extractor must be at least 1";
-  if (coarse_levels_from < 1) return "dispatcher.coarse_levels_from must be at least 1";
-  if (late_us <= 0 || silent_us <= 0) return "dispatcher.late_ms and dispatcher.silent_ms must be positive";
-  const Result<> checked = features.Check();
-  return checked ? "" : checked.error().sentence;
+Result<> WorkQueueOptions::Check() const {
+  if (max_queued_frames < 1) return Failed("dispatcher.max_queued_frames must be at least 1");
+  if (max_frames_in_flight < 1) return Failed("dispatcher.max_frames_in_flight must be at least 1");
+  if (jobs_per_extractor < 1) return Failed("dispatcher.jobs_per_extractor must be at least 1");
+  if (coarse_levels_from < 1) return Failed("dispatcher.coarse_levels_from must be at least 1");
+  if (late_us <= 0 || silent_us <= 0) return Failed("dispatcher.late_ms and dispatcher.silent_ms must be positive");
+  return features.Check();
 }
 
 WorkQueue::WorkQueue(const WorkQueueOptions& options) : options_(options) {}

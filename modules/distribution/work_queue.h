@@ -31,8 +31,7 @@ struct WorkQueueOptions {
   int64_t late_us = 2'000'000;
   int64_t silent_us = 1'500'000;  // an extractor that says nothing for this long is dead
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 class WorkQueue {

@@ -3,10 +3,10 @@
 #include <cinttypes>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "evaluation/map_text.h"
 #include "evaluation/pose_text.h"
 
@@ -76,25 +76,6 @@ std::optional<Statistics> SummarizeFrames(const std::vector<FrameRecord>& frames
 }
 
 }  // namespace
-
-void WriteFile(const std::string& path, const std::string& text) {
-  const std::string beside = path + ".part";
-  std::error_code error;
-  {
-    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
-    file << text;
-    file.close();
-    if (!file) {
-      std::filesystem::remove(beside, error);
-      throw InputError("file " + path +
-                       " can't be written: check the folder, its permissions and the space on the disk");
-    }
-  }
-  std::filesystem::rename(beside, path, error);
-  if (error) {
-    throw InputError("file " + path + " can't be written: " + error.message());
-  }
-}
 
 std::string FramesCsv(const RunRecord& record) {
   std::string text =
@@ -178,7 +159,7 @@ void WriteRun(const RunRecord& record, const std::string& folder) {
   WriteFile(folder + "/ground_truth.txt", TumText(record.GroundTruth()));
   WriteFile(folder + "/frames.csv", FramesCsv(record));
   WriteFile(folder + "/loops.csv", LoopsCsv(record));
-  WriteFile(folder + "/run.json", RunJson(record));  // last: whoever sees it finds all the others
+  WriteFile(folder + "/run.json", RunJson(record));  // last: when it exists, so do the others
 }
 
 }  // namespace tessera

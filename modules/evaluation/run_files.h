@@ -7,10 +7,6 @@
 
 namespace tessera {
 
-// Writes `text` beside `path`, then renames it: a reader sees the old file or the new one, never half of one.
-// Throws InputError if it can't be written.
-void WriteFile(const std::string& path, const std::string& text);
-
 // Columns: frame, utime_us, state, pose_time_ms, latency_ms, map_wait_ms, features, matches, inliers, landmarks,
 // is_keyframe, num_deltas. What is unknown is empty.
 std::string FramesCsv(const RunRecord& record);

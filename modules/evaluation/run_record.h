@@ -1,5 +1,5 @@
-// What is known of a run: every pose and true pose, the map, and the figures of the stages. All that a run's folder
-// tells is derived from it.
+// The record of a run: every pose, the ground truth, the map, and the figures of the stages. All files in a run's
+// folder are derived from it.
 #pragma once
 
 #include <cstdint>
@@ -24,13 +24,13 @@ struct StampedPose {
   Rigid3 world_from_camera;
 };
 
-// A frame of which a POSE came.
+// A frame with a POSE message.
 struct FrameRecord {
   PoseEstimate pose;
   int64_t publish_us = 0;              // wall clock at which the pose was published
   std::optional<double> pose_time_ms;  // since the pose before it was published; none for the first
-  std::optional<double> latency_ms;    // since the dispatcher first heard of the frame; none if that is unknown
-  std::optional<double> map_wait_ms;   // how long it waited in the tracker for changes of the map
+  std::optional<double> latency_ms;    // since the dispatcher received the frame; none if unknown
+  std::optional<double> map_wait_ms;   // time it waited in the tracker for map deltas
 };
 
 struct FrameCounts {
@@ -43,25 +43,25 @@ struct FrameCounts {
   int64_t relocalizations = 0;    // changes back, into a part of the map that was there before
 };
 
-// What a stage said last of its own work.
+// The latest figures of a stage.
 struct StageFigures {
   Statistics step_ms;
   int64_t num_repaired = 0;              // messages
   int64_t num_lost = 0;                  // messages
   int64_t num_dropped = 0;               // frames
-  std::map<std::string, double> values;  // what else it counts, by name
+  std::map<std::string, double> values;  // other counters, by name
 };
 
 class RunRecord {
  public:
-  // What comes twice counts once: the first.
+  // A frame counts once: the first pose.
   void AddPose(const PoseEstimate& pose, int64_t publish_us);
-  // The next change of the map. Returns Map::Apply's sentence.
+  // The next change of the map; fails as Map::Apply does.
   Result<> ApplyDelta(const MapDelta& delta);
-  // What was removed from the map, also before the first change that came here.
+  // Keyframes removed from the map, also before the first change received.
   void AddRemoved(const RemovedInDelta& removed);
   void AddGroundTruth(const GroundTruthPose& truth);
-  // The newest figures replace those before.
+  // Replaces earlier figures.
   void SetStage(const std::string& name, const StageFigures& figures);
   // The tracker has seen the end: one past the last frame's number, and how many frames never reached it.
   void SetEnd(int64_t num_frames, int64_t num_dropped);

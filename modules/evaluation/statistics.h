@@ -1,4 +1,4 @@
-// The figures by which a spread of measurements is told: the same everywhere.
+// Summary statistics of measurements, the same everywhere.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct Statistics {
   double max = 0.0;
 };
 
-// Quantile q of n sorted values stands at (n - 1) q, interpolated linearly between its neighbors.
+// Quantile q of n sorted values is at index (n - 1) q, interpolated linearly.
 // nullopt if there are no values.
 std::optional<Statistics> Summarize(std::vector<double> values);
 

@@ -7,17 +7,16 @@
 
 namespace tessera {
 
-std::string LoopCloserOptions::Check() const {
-  for (const std::string& sentence :
-       {candidates.Check(), verification.Check(), correction.Check(), relocalization.Check()}) {
-    if (!sentence.empty()) return sentence;
-  }
-  return "";
+Result<> LoopCloserOptions::Check() const {
+  TESSERA_RETURN_IF_FAILED(candidates.Check());
+  TESSERA_RETURN_IF_FAILED(verification.Check());
+  TESSERA_RETURN_IF_FAILED(correction.Check());
+  return relocalization.Check();
 }
 
 LoopCloser::LoopCloser(std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options)
     : options_(options), vocabulary_(std::move(vocabulary)) {
-  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+  ThrowIfFailed<std::invalid_argument>(options.Check());
 }
 
 Result<> LoopCloser::ApplyDelta(const MapDelta& delta) {

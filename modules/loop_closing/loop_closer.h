@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "core/result.h"
 #include "loop_closing/loop_correction.h"
 #include "loop_closing/place_candidates.h"
 #include "loop_closing/place_verification.h"
@@ -23,8 +24,8 @@ struct LoopCloserOptions {
   CorrectionOptions correction;
   RelocalizationOptions relocalization;
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Answers are pure functions of the map and the request: a loop closer that is restarted and gets the same map gives

@@ -48,8 +48,8 @@ std::vector<LoopResult::Correction> JoinParts(const Map& map, KeyframeId current
 
 }  // namespace
 
-std::string CorrectionOptions::Check() const {
-  if (min_shared_landmarks < 1 || !(loop_weight > 0.0)) return "the loop closer's graph needs positive weights";
+Result<> CorrectionOptions::Check() const {
+  if (min_shared_landmarks < 1 || !(loop_weight > 0.0)) return Failed("the loop closer's graph needs positive weights");
   return graph.Check();
 }
 

@@ -1,9 +1,9 @@
 // The correction of the map that a loop asks for: the pose of every keyframe, so that both visits of a place agree.
 #pragma once
 
-#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "loop_closing/place_verification.h"
 #include "map/map.h"
 #include "messages/loop_types.h"
@@ -16,8 +16,8 @@ struct CorrectionOptions {
   double loop_weight = 1.0;        // of the new loop's edge, against one edge of the path
   PoseGraphOptions graph;
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // The essential graph of one part of the map: the spanning tree, pairs that share many landmarks, the

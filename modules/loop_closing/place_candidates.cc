@@ -16,7 +16,7 @@ struct Group {
 };
 
 // Neighboring keyframes look alike, so their scores are added: a place of which only one image matches is weak. Best
-// group first, each named by its best keyframe (of equals, which a camera that stands still makes, the oldest); groups
+// group first, each named by its best keyframe (if equal, as a camera at rest makes them, the oldest); groups
 // with the same best keyframe are one.
 std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::Place>& found,
                               const CandidateOptions& options) {
@@ -107,11 +107,11 @@ std::vector<std::set<KeyframeId>> PlacesOf(const Map& map, const PlaceDatabase& 
 
 }  // namespace
 
-std::string CandidateOptions::Check() const {
+Result<> CandidateOptions::Check() const {
   if (min_shared_landmarks < 1 || num_neighbors < 1 || num_consistent < 0 || max_candidates < 1) {
-    return "the numbers of neighbors and candidates must be positive";
+    return Failed("the numbers of neighbors and candidates must be positive");
   }
-  return "";
+  return {};
 }
 
 Candidates FindLoopCandidates(const Map& map, const PlaceDatabase& places, KeyframeId id,

@@ -1,9 +1,9 @@
 // Place candidates: earlier places that look like the one in a keyframe or an image.
 #pragma once
 
-#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "map/map.h"
 #include "place_recognition/place_database.h"
 
@@ -16,8 +16,8 @@ struct CandidateOptions {
   int num_consistent = 2;         // previous keyframes that must have the same place among their candidates
   int max_candidates = 5;
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 struct Candidates {

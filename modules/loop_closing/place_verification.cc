@@ -62,15 +62,13 @@ SimilarityOptions SimilarityFor(const CameraCalibration& camera, SimilarityOptio
 
 }  // namespace
 
-std::string VerificationOptions::Check() const {
+Result<> VerificationOptions::Check() const {
   if (min_matches < 3 || min_seen < 6 || num_neighbors < 1) {
-    return "verification needs at least 3 matches and 6 observed landmarks";
+    return Failed("verification needs at least 3 matches and 6 observed landmarks");
   }
-  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage must be between 0 and 1";
-  for (const Result<>& checked : {similarity.Check(), guided.Check()}) {
-    if (!checked) return checked.error().sentence;
-  }
-  return "";
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return Failed("min_coverage must be between 0 and 1");
+  TESSERA_RETURN_IF_FAILED(similarity.Check());
+  return guided.Check();
 }
 
 KnownPoints LandmarksAround(const Map& map, KeyframeId center, int num_neighbors) {

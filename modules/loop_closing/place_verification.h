@@ -3,9 +3,9 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "geometry/pose_optimization.h"
 #include "geometry/similarity.h"
 #include "map/map.h"
@@ -26,8 +26,8 @@ struct VerificationOptions {
   int min_seen = 45;          // landmarks of the place that the keyframe must observe
   double min_coverage = 0.4;  // see Coverage(): true places have 0.75 and more, the same car elsewhere up to 0.25
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 struct VerifiedPlace {

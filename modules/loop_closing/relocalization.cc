@@ -31,13 +31,12 @@ std::optional<Rigid3> RoughPose(const Keyframe& keyframe, const BagOfWords& keyf
 
 }  // namespace
 
-std::string RelocalizationOptions::Check() const {
+Result<> RelocalizationOptions::Check() const {
   if (min_matches < 4 || min_seen < 6 || num_neighbors < 1) {
-    return "relocalization needs at least 4 matches and 6 observed landmarks";
+    return Failed("relocalization needs at least 4 matches and 6 observed landmarks");
   }
-  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return "min_coverage must be between 0 and 1";
-  const Result<> checked = guided.Check();
-  return checked ? "" : checked.error().sentence;
+  if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return Failed("min_coverage must be between 0 and 1");
+  return guided.Check();
 }
 
 RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, const Vocabulary& vocabulary,

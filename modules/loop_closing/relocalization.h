@@ -1,8 +1,7 @@
 // Relocalization: where an image was taken, from the map alone.
 #pragma once
 
-#include <string>
-
+#include "core/result.h"
 #include "geometry/absolute_pose.h"
 #include "loop_closing/place_candidates.h"
 #include "map/map.h"
@@ -23,8 +22,8 @@ struct RelocalizationOptions {
   int min_seen = 50;          // landmarks of the place that the image must show
   double min_coverage = 0.4;  // see Coverage()
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Tries the candidates one after the other: matches by visual words, the pose from three points (RANSAC, seeded by the

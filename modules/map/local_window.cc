@@ -31,11 +31,11 @@ std::vector<KeyframeId> BestOutsiders(const Map& map, const std::vector<Keyframe
 
 }  // namespace
 
-std::string LocalWindowOptions::Check() const {
-  if (max_inner_keyframes < 2) return "mapper.max_inner_keyframes must be at least 2";
-  if (min_shared_landmarks < 1) return "mapper.min_shared_landmarks must be at least 1";
-  if (max_outer_keyframes < 1) return "mapper.max_outer_keyframes must be at least 1";
-  return "";
+Result<> LocalWindowOptions::Check() const {
+  if (max_inner_keyframes < 2) return Failed("mapper.max_inner_keyframes must be at least 2");
+  if (min_shared_landmarks < 1) return Failed("mapper.min_shared_landmarks must be at least 1");
+  if (max_outer_keyframes < 1) return Failed("mapper.max_outer_keyframes must be at least 1");
+  return {};
 }
 
 LocalWindow SelectLocalWindow(const Map& map, KeyframeId center, const LocalWindowOptions& options) {

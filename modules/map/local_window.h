@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/result.h"
 #include "map/map.h"
 
 namespace tessera {
@@ -15,8 +16,7 @@ struct LocalWindowOptions {
   // window of Strasdat et al. 2011); else they stay, and see the window's points. stages/mapper/README.md has figures.
   bool is_double = false;
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  Result<> Check() const;
 };
 
 struct LocalWindow {

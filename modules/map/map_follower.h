@@ -2,7 +2,7 @@
 // owner for, and puts snapshots together. It holds no map: a replica applies what Take() gives, at once or later, and
 // says so if it did not fit.
 //
-// Logical time has its own order (DeltaSchedule); this is about delivery alone.
+// Which frame sees which delta is decided elsewhere (tracking/tracker_time.h); this is about delivery alone.
 #pragma once
 
 #include <cstdint>

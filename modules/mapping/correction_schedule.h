@@ -1,9 +1,9 @@
-// When the mapper applies what the loop closer and the global adjuster found. The law of logical time: before keyframe
-// k it applies exactly the loop results of keyframes <= k - E; an adjustment that keyframe a asked for, before keyframe
+// When the mapper applies the results of the loop closer and the global adjuster. Logical time: before keyframe k it
+// applies exactly the loop results of keyframes <= k - E; an adjustment requested at keyframe a, before keyframe
 //
 //   a + G + a / g                                     a larger map takes longer to adjust: g bounds the growth
 //
-// What comes early is held back, what is missing is waited for.
+// An early result is held back, a missing one is waited for.
 #pragma once
 
 #include <map>
@@ -14,40 +14,39 @@
 
 namespace tessera {
 
-// What is due at one moment, in the order of the keyframes that it answers.
+// The corrections that are due before a keyframe, in the order of the keyframes that they answer.
 struct DueCorrections {
-  std::vector<LoopResult> loops;  // those that found one
+  std::vector<LoopResult> loops;  // only those that found a loop
   std::optional<GlobalAdjustment> adjustment;
 };
 
 struct CorrectionDelays {
   int64_t loop_keyframes = 6;         // E
   int64_t adjustment_keyframes = 40;  // G
-  int64_t adjustment_growth =
-      8;  // g: what a map takes to be adjusted, where keyframes come at 5 Hz, and half as much again
+  int64_t adjustment_growth = 8;      // g: 1.5 times the time of an adjustment, for keyframes at 5 Hz
 };
 
 class CorrectionSchedule {
  public:
   explicit CorrectionSchedule(const CorrectionDelays& delays) : delays_(delays) {}
 
-  // The next keyframe that will get a loop result; those before, in a map that was loaded, have none.
+  // The first keyframe that gets a loop result; the keyframes of a loaded map have none.
   void BeginAt(KeyframeId first) { next_loop_ = first; }
-  // In any order; what came before, or is too old, changes nothing.
+  // In any order; a repeated or outdated result changes nothing.
   void Receive(const LoopResult& result);
   void Receive(const GlobalAdjustment& adjustment);
-  // The map after this delta, which answers `asked`, is being adjusted; one adjustment at a time.
+  // An adjustment of the map after this delta, which answers `asked`, was requested. One at a time.
   void Ask(KeyframeId asked, int64_t delta) { asked_ = Asked{asked, delta}; }
 
-  // Whether all is there that must be applied before keyframe `id`.
+  // Whether all corrections that are due before keyframe `id` have arrived.
   bool CanProcess(KeyframeId id) const;
-  // Takes it out. CanProcess(id) must hold.
+  // Takes these corrections. CanProcess(id) must hold.
   DueCorrections Take(KeyframeId id);
 
-  // The same at the end, when `last` was the last keyframe: everything that was asked for is due.
+  // The same after the last keyframe: all results of keyframes and the requested adjustment are due.
   bool CanFinish(KeyframeId last) const;
   DueCorrections TakeAll(KeyframeId last);
-  // Number of the delta that asked for an adjustment which is still on its way; nullopt: none is.
+  // Number of the delta whose requested adjustment has not been taken; nullopt: there is none.
   std::optional<int64_t> asked_delta() const { return asked_ ? std::optional(asked_->delta) : std::nullopt; }
 
  private:

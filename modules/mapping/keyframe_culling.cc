@@ -38,11 +38,11 @@ bool IsRedundant(const Map& map, KeyframeId id, const KeyframeCullingOptions& op
 
 }  // namespace
 
-std::string KeyframeCullingOptions::Check() const {
+Result<> KeyframeCullingOptions::Check() const {
   if (!(redundant_share > 0.0) || redundant_observers < 1 || kept_newest < 1) {
-    return "the limits of redundant keyframes must be positive";
+    return Failed("the limits of redundant keyframes must be positive");
   }
-  return "";
+  return {};
 }
 
 void CullKeyframes(KeyframeId center, const KeyframeCullingOptions& options, RemovedKeyframes& removed,

@@ -2,8 +2,7 @@
 // explored and not with the time spent there. As in ORB-SLAM (Mur-Artal et al. 2015).
 #pragma once
 
-#include <string>
-
+#include "core/result.h"
 #include "map/map_editor.h"
 #include "map/removed_keyframes.h"
 
@@ -14,8 +13,8 @@ struct KeyframeCullingOptions {
   int redundant_observers = 3;   // ... has so many other observers, on a pyramid level at most one coarser
   int kept_newest = 3;           // the newest keyframes stay: their neighbors are yet to come
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Removes the redundant keyframes among those that share landmarks with `center`. Their children pass to their parents,

@@ -184,12 +184,13 @@ bool PairSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const Pixel
 
 }  // namespace
 
-std::string CreationOptions::Check() const {
-  if (max_neighbors < 1) return "new landmarks need at least one neighbor to be searched";
+Result<> CreationOptions::Check() const {
+  if (max_neighbors < 1) return Failed("new landmarks need at least one neighbor to be searched");
   if (!(min_parallax_rad > 0.0) || !(min_baseline_share > 0.0))
-    return "the least parallax and baseline of new landmarks must be positive";
-  if (max_hamming < 1 || max_hamming > 256) return "the Hamming distance of new landmarks must be between 1 and 256";
-  return "";
+    return Failed("the least parallax and baseline of new landmarks must be positive");
+  if (max_hamming < 1 || max_hamming > 256)
+    return Failed("the Hamming distance of new landmarks must be between 1 and 256");
+  return {};
 }
 
 std::vector<LandmarkId> CreateFromDepth(KeyframeId id, const CreationOptions& options, MapEditor& editor) {

@@ -1,9 +1,9 @@
 // Landmark creation at a new keyframe: from the depth of its keypoints, and by triangulation with other keyframes.
 #pragma once
 
-#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "map/map_editor.h"
 
 namespace tessera {
@@ -21,8 +21,8 @@ struct CreationOptions {
       40.0;                    // a depth of up to this many baselines is good enough by itself (ORB-SLAM2: 35, 40)
   int min_depth_points = 100;  // the nearest so many keypoints become landmarks at any depth
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Creates landmarks from keypoints of `keyframe` that have depth and observe no landmark yet. Returns them.

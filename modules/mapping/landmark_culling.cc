@@ -6,12 +6,13 @@
 
 namespace tessera {
 
-std::string LandmarkCullingOptions::Check() const {
-  if (recent_keyframes < 1 || min_observations < 1) return "a landmark must be recent for at least one keyframe";
+Result<> LandmarkCullingOptions::Check() const {
+  if (recent_keyframes < 1 || min_observations < 1)
+    return Failed("a landmark must be recent for at least one keyframe");
   if (num_checked_views < 1 || !(min_seen_share >= 0.0)) {
-    return "a new landmark must be checked in at least one keyframe";
+    return Failed("a new landmark must be checked in at least one keyframe");
   }
-  return "";
+  return {};
 }
 
 void RecentLandmarks::Add(KeyframeId created_at, const std::vector<LandmarkId>& landmarks) {

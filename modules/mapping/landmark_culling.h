@@ -1,9 +1,9 @@
 // Landmark culling: landmarks that prove unreliable soon after their creation leave the map.
 #pragma once
 
-#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "map/map_editor.h"
 
 namespace tessera {
@@ -14,8 +14,8 @@ struct LandmarkCullingOptions {
   int num_checked_views = 10;   // keyframes around the newest that are checked for a view of a new landmark
   double min_seen_share = 0.3;  // of those that should see it: corners are found again in about half of the images
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Landmarks created lately, which must yet show that they are found again (the recent map points of Mur-Artal et al.,

@@ -74,11 +74,12 @@ void ProjectLandmarks(const std::set<KeyframeId>& targets, const std::vector<Lan
   for (const KeyframeId target : targets) ProjectInto(target, landmarks, options, editor);
 }
 
-std::string FusionOptions::Check() const {
-  if (max_neighbors < 1 || max_second_neighbors < 0) return "landmarks must be fused with at least one neighbor";
+Result<> FusionOptions::Check() const {
+  if (max_neighbors < 1 || max_second_neighbors < 0)
+    return Failed("landmarks must be fused with at least one neighbor");
   if (!(radius_px > 0.0) || max_hamming < 1)
-    return "the search for duplicate landmarks needs a positive radius and Hamming distance";
-  return "";
+    return Failed("the search for duplicate landmarks needs a positive radius and Hamming distance");
+  return {};
 }
 
 void FuseLandmarks(KeyframeId id, const FusionOptions& options, MapEditor& editor) {

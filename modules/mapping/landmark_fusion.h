@@ -2,9 +2,9 @@
 #pragma once
 
 #include <set>
-#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "map/map_editor.h"
 
 namespace tessera {
@@ -15,8 +15,8 @@ struct FusionOptions {
   double radius_px = 3.0;        // of the search, at level 0; times the scale of the level
   int max_hamming = 50;          // bits of 256
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Projects the landmarks of `keyframe` into its neighbors, and theirs into it. Where a keypoint agrees with the

@@ -52,16 +52,17 @@ void RefreshDescriptions(MapEditor& editor) {
 
 }  // namespace
 
-std::string MapperOptions::Check() const {
-  for (const std::string& sentence : {creation.Check(), fusion.Check(), window.Check(), bundle.Check(),
-                                      landmark_culling.Check(), keyframe_culling.Check()}) {
-    if (!sentence.empty()) return sentence;
-  }
-  return "";
+Result<> MapperOptions::Check() const {
+  TESSERA_RETURN_IF_FAILED(creation.Check());
+  TESSERA_RETURN_IF_FAILED(fusion.Check());
+  TESSERA_RETURN_IF_FAILED(window.Check());
+  TESSERA_RETURN_IF_FAILED(bundle.Check());
+  TESSERA_RETURN_IF_FAILED(landmark_culling.Check());
+  return keyframe_culling.Check();
 }
 
 Mapper::Mapper(const MapperOptions& options) : options_(options) {
-  if (const std::string sentence = options.Check(); !sentence.empty()) throw std::invalid_argument(sentence);
+  ThrowIfFailed<std::invalid_argument>(options.Check());
 }
 
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/result.h"
 #include "map/local_window.h"
 #include "map/map.h"
 #include "map/removed_keyframes.h"
@@ -29,8 +30,8 @@ struct MapperOptions {
   KeyframeCullingOptions keyframe_culling;
   LoopFusionOptions loop_fusion;
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 class Mapper {

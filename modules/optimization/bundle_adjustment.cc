@@ -58,7 +58,7 @@ std::vector<char> Classify(const BundleProblem& problem, const BundleResult& res
   return is_inlier;
 }
 
-// Before the first round nothing is known of outliers; only what stands behind its camera can't take part.
+// Before the first round outliers are unknown; only points behind the camera are excluded.
 std::vector<char> InFront(const BundleProblem& problem) {
   std::vector<char> is_in_front(problem.observations.size(), 0);
   for (size_t i = 0; i < is_in_front.size(); ++i) {
@@ -92,55 +92,53 @@ void RestoreScale(const BundleProblem& problem, BundleResult& result) {
   }
 }
 
-std::string CheckObservations(const BundleProblem& problem) {
+Result<> CheckObservations(const BundleProblem& problem) {
   for (size_t i = 0; i < problem.observations.size(); ++i) {
     const BundleObservation& o = problem.observations[i];
     const std::string name = "observation " + std::to_string(i);
     if (!IsIndex(o.pose, problem.poses.size()) || !IsIndex(o.point, problem.points.size())) {
-      return name + " names pose " + std::to_string(o.pose) + " and point " + std::to_string(o.point) +
-             ", and one of them is not in the problem";
+      return Failed(name + " names pose " + std::to_string(o.pose) + " and point " + std::to_string(o.point) +
+                    ", and one of them is not in the problem");
     }
     if (!(o.seen.sigma_px > 0.0)) {
-      return name + " has a sigma_px that is not positive";
+      return Failed(name + " has a sigma_px that is not positive");
     }
     if (o.seen.has_right() && !(problem.baseline_m > 0.0)) {
-      return name + " has a right column, but baseline_m is not positive";
+      return Failed(name + " has a right column, but baseline_m is not positive");
     }
   }
   return {};
 }
 
-std::string CheckConstraints(const BundleProblem& problem) {
+Result<> CheckConstraints(const BundleProblem& problem) {
   for (size_t i = 0; i < problem.constraints.size(); ++i) {
     const RelativePoseConstraint& c = problem.constraints[i];
     const std::string name = "constraint " + std::to_string(i);
     if (!IsIndex(c.from, problem.poses.size()) || !IsIndex(c.to, problem.poses.size()) || c.from == c.to) {
-      return name + " must name two different poses of the problem";
+      return Failed(name + " must name two different poses of the problem");
     }
     if (c.information.llt().info() != Eigen::Success) {
-      return name + " has an information matrix that is not positive definite";
+      return Failed(name + " has an information matrix that is not positive definite");
     }
   }
   return {};
 }
 
-std::string CheckGauge(const BundleProblem& problem) {
-  const auto num_fixed =
-      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
+Result<> CheckGauge(const BundleProblem& problem) {
+  const int num_fixed = problem.num_fixed_poses();
   if (num_fixed == 0) {
-    return "no pose is fixed; fix one at least (gauge)";
+    return Failed("no pose is fixed; fix one at least (gauge)");
   }
   if (problem.scale_pose == -1) {
     return {};
   }
   if (!IsIndex(problem.scale_pose, problem.poses.size()) ||
       problem.poses[static_cast<size_t>(problem.scale_pose)].is_fixed) {
-    return "scale_pose must be the index of a free pose, or -1";
+    return Failed("scale_pose must be the index of a free pose, or -1");
   }
-  const bool has_right = std::any_of(problem.observations.begin(), problem.observations.end(),
-                                     [](const BundleObservation& o) { return o.seen.has_right(); });
-  if (num_fixed > 1 || has_right || !problem.constraints.empty()) {
-    return "scale_pose is for mono with one fixed pose and no constraints; all else fixes the scale, so set it to -1";
+  if (num_fixed > 1 || problem.has_right() || !problem.constraints.empty()) {
+    return Failed(
+        "scale_pose is for mono with one fixed pose and no constraints; all else fixes the scale, so set it to -1");
   }
   return {};
 }
@@ -171,27 +169,34 @@ std::optional<BundleResult> AdjustInRounds(const BundleProblem& problem, const B
 
 }  // namespace
 
-std::string BundleProblem::Check() const {
-  if (!(calibration.fx_px > 0.0) || !(calibration.fy_px > 0.0)) {
-    return "the calibration's focal lengths must be positive";
-  }
-  for (const std::string& problem : {CheckObservations(*this), CheckConstraints(*this), CheckGauge(*this)}) {
-    if (!problem.empty()) {
-      return problem;
-    }
-  }
-  return {};
+int BundleProblem::num_fixed_poses() const {
+  return static_cast<int>(
+      std::count_if(poses.begin(), poses.end(), [](const BundlePose& pose) { return pose.is_fixed; }));
 }
 
-std::string BundleOptions::Check() const {
+bool BundleProblem::has_right() const {
+  return std::any_of(observations.begin(), observations.end(),
+                     [](const BundleObservation& o) { return o.seen.has_right(); });
+}
+
+Result<> BundleProblem::Check() const {
+  if (!(calibration.fx_px > 0.0) || !(calibration.fy_px > 0.0)) {
+    return Failed("the calibration's focal lengths must be positive");
+  }
+  TESSERA_RETURN_IF_FAILED(CheckObservations(*this));
+  TESSERA_RETURN_IF_FAILED(CheckConstraints(*this));
+  return CheckGauge(*this);
+}
+
+Result<> BundleOptions::Check() const {
   if (max_num_iterations < 1 || num_rounds < 1) {
-    return "bundle adjustment needs at least one iteration and one round";
+    return Failed("bundle adjustment needs at least one iteration and one round");
   }
   if (!(initial_radius > 0.0) || !(initial_radius <= kMaxRadius)) {
-    return "initial_radius must be positive and at most 1e10";
+    return Failed("initial_radius must be positive and at most 1e10");
   }
   if (!(function_tolerance >= 0.0) || max_num_dense_poses < 0) {
-    return "function_tolerance and max_num_dense_poses must not be negative";
+    return Failed("function_tolerance and max_num_dense_poses must not be negative");
   }
   return {};
 }
@@ -201,16 +206,12 @@ BundleOptions GlobalBundleOptions() {
 }
 
 std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const BundleOptions& options) {
-  for (const std::string& sentence : {problem.Check(), options.Check()}) {
-    if (!sentence.empty()) {
-      throw std::invalid_argument("AdjustBundle: " + sentence);
-    }
-  }
+  ThrowIfFailed<std::invalid_argument>(problem.Check(), "AdjustBundle: ");
+  ThrowIfFailed<std::invalid_argument>(options.Check(), "AdjustBundle: ");
   if (!IsFinite(problem)) {
     return std::nullopt;
   }
-  const auto num_free =
-      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return !pose.is_fixed; });
+  const int num_free = static_cast<int>(problem.poses.size()) - problem.num_fixed_poses();
   const bool is_window = num_free <= options.max_num_dense_poses && !options.is_always_ceres;
   std::optional<BundleResult> result =
       is_window ? AdjustInRounds<WindowSolver>(problem, options) : AdjustInRounds<BundleSolver>(problem, options);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/ids.h"
+#include "core/result.h"
 #include "geometry/camera.h"
 #include "geometry/reprojection.h"
 #include "geometry/rigid3.h"
@@ -49,8 +50,10 @@ struct BundleProblem {
   // since a second fixed pose, a right column or a constraint fixes the scale.
   int scale_pose = -1;
 
-  // Empty if well formed, else one sentence: indices in range, a fixed pose, a scale pose only where it makes sense.
-  std::string Check() const;
+  int num_fixed_poses() const;
+  bool has_right() const;  // whether an observation has a right column
+  // Fails unless indices are in range, a pose is fixed, and a scale pose is given only where it makes sense.
+  Result<> Check() const;
 };
 
 struct BundleOptions {
@@ -63,11 +66,11 @@ struct BundleOptions {
   // Up to this many free poses the reduced camera system is solved dense, above it sparse. Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
   int max_num_dense_poses = 60;
-  // Dense systems by Ceres too, instead of by WindowSolver, which takes the same steps in a quarter of the time.
+  // Solve dense systems with Ceres too, instead of WindowSolver, which takes the same steps in a quarter of the time.
   bool is_always_ceres = false;
 
-  // Empty if all is well, else one sentence that says what is out of range.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // For a whole map after a loop was closed (README.md has the measurements): little damping, and steps that gain little
@@ -95,7 +98,7 @@ struct BundleResult {
 // with Huber's rho at the chi-square limits of 95 %. After each round, observations that stand behind the camera or
 // exceed the limit take no part in the next; they may return. A round that changes none of them is the last.
 //
-// With poses seen by nobody but constraints this is the double window of H. Strasdat, A. Davison, J. M. M. Montiel,
+// With poses that only constraints hold this is the double window of H. Strasdat, A. Davison, J. M. M. Montiel,
 // K. Konolige, "Double Window Optimisation for Constant Time Visual SLAM", ICCV 2011: reprojection errors inside,
 // relative poses outside. With two poses it is the first bundle adjustment of mono initialization (scale_pose = the
 // second).

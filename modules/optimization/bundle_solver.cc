@@ -7,19 +7,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "optimization/sparse_library.h"
+#include "optimization/ceres_options.h"
 
 namespace tessera {
 namespace {
-
-ceres::Problem::Options ProblemOptions(ceres::EvaluationCallback& callback) {
-  ceres::Problem::Options options;
-  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  options.evaluation_callback = &callback;
-  options.disable_all_safety_checks = true;  // BundleProblem::Check() made them
-  return options;
-}
 
 template <class Cost, class... Arguments>
 void Append(std::vector<std::unique_ptr<ceres::CostFunction>>& costs, const Arguments&... arguments) {
@@ -31,8 +22,7 @@ void Append(std::vector<std::unique_ptr<ceres::CostFunction>>& costs, const Argu
 BundleSolver::BundleSolver(const BundleProblem& problem, const BundleOptions& options)
     : problem_(problem),
       options_(options),
-      is_split_(std::any_of(problem.observations.begin(), problem.observations.end(),
-                            [](const BundleObservation& o) { return o.seen.has_right(); })),
+      is_split_(problem.has_right()),
       block_size_(is_split_ ? 3 : 6),
       mono_loss_(std::sqrt(Chi2Limit(false))),
       stereo_loss_(std::sqrt(Chi2Limit(true))),
@@ -153,23 +143,17 @@ std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_
     return std::nullopt;
   }
   PoseUpdater updater(poses_);
-  ceres::Problem ceres_problem(ProblemOptions(updater));
+  ceres::Problem ceres_problem(CeresProblemOptions(updater));
   AddParameters(ceres_problem);
   AddResiduals(takes_part, ceres_problem);
 
-  ceres::Solver::Options options;
+  ceres::Solver::Options options = CeresSolverOptions(options_.max_num_iterations, options_.function_tolerance);
   options.linear_solver_type =
       num_free_poses <= options_.max_num_dense_poses ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-  options.sparse_linear_algebra_library_type = kSparseLibrary;
   options.linear_solver_ordering = Ordering();
-  options.max_num_iterations = options_.max_num_iterations;
-  options.function_tolerance = options_.function_tolerance;
   options.initial_trust_region_radius = options_.initial_radius;
   options.max_trust_region_radius = kMaxRadius;
-  options.max_solver_time_in_seconds = 1e9;  // iterations bound it, never the clock: results must not depend on load
-  options.num_threads = 1;
   options.jacobi_scaling = false;  // the damping is scaled by the diagonal already
-  options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_problem, &summary);
   if (!summary.IsSolutionUsable()) {

@@ -1,4 +1,4 @@
-// What one solve of a bundle tells. Only this module's sources include this file.
+// The outcome of one solve of a bundle. Only this module's sources include this file.
 #pragma once
 
 namespace tessera {

@@ -19,9 +19,7 @@ void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleP
   for (const KeyframeId id : window.outer) {
     add(id, !is_double || id == window.outer.front());
   }
-  const auto num_fixed =
-      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
-  if (num_fixed == 0) problem.poses.front().is_fixed = true;
+  if (problem.num_fixed_poses() == 0) problem.poses.front().is_fixed = true;
 }
 
 // Index of the keyframe among the poses; -1: not in the window.
@@ -86,11 +84,7 @@ void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
 
 // Mono with a single fixed pose: the free pose of the lowest id keeps its distance.
 int ScalePose(const BundleProblem& problem) {
-  const auto num_fixed =
-      std::count_if(problem.poses.begin(), problem.poses.end(), [](const BundlePose& pose) { return pose.is_fixed; });
-  const bool has_right = std::any_of(problem.observations.begin(), problem.observations.end(),
-                                     [](const BundleObservation& o) { return o.seen.has_right(); });
-  if (num_fixed > 1 || has_right) return -1;
+  if (problem.num_fixed_poses() > 1 || problem.has_right()) return -1;
   int best = -1;
   for (size_t i = 0; i < problem.poses.size(); ++i) {
     const BundlePose& pose = problem.poses[i];

@@ -8,8 +8,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include "optimization/ceres_options.h"
 #include "optimization/pose_graph_costs.h"
-#include "optimization/sparse_library.h"
 
 namespace tessera {
 namespace {
@@ -54,21 +54,15 @@ std::vector<char> ConnectedToFixed(const PoseGraphProblem& problem) {
 }
 
 ceres::Solver::Options SolverOptions(const PoseGraphOptions& options) {
-  ceres::Solver::Options solver;
+  ceres::Solver::Options solver = CeresSolverOptions(options.max_num_iterations, options.function_tolerance);
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.sparse_linear_algebra_library_type = kSparseLibrary;
-  solver.max_num_iterations = options.max_num_iterations;
-  solver.function_tolerance = options.function_tolerance;
-  // Both depend on the map's unit.
+  // These two depend on the unit of the map.
   solver.gradient_tolerance = 0.0;
   solver.parameter_tolerance = 0.0;
   // The first steps are Gauss-Newton's. The error of a loop is spread by the slowest modes of a chain, whose curvature
   // is (length of the chain)^-2 of the diagonal: with Ceres' 1e4 damping would hold them for many steps, and 20
   // iterations end long before the minimum.
   solver.initial_trust_region_radius = 1e16;
-  solver.max_solver_time_in_seconds = 1e9;  // iterations bound it, never the clock: results must not depend on load
-  solver.num_threads = 1;
-  solver.logging_type = ceres::SILENT;
   return solver;
 }
 
@@ -93,17 +87,13 @@ class PoseGraphSolver {
 
   std::optional<std::vector<Sim3>> Solve() {
     NodeUpdater updater(nodes_);
-    ceres::Problem::Options problem_options;
-    problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    problem_options.evaluation_callback = &updater;
-    problem_options.disable_all_safety_checks = true;  // PoseGraphProblem::Check() made them
-    ceres::Problem ceres_problem(problem_options);
+    ceres::Problem ceres_problem(CeresProblemOptions(updater));
     if (!AddNodes(ceres_problem)) return std::nullopt;
     AddEdges(ceres_problem);
     ceres::Solver::Summary summary;
     ceres::Solve(SolverOptions(options_), &ceres_problem, &summary);
     if (!summary.IsSolutionUsable()) return std::nullopt;
-    return Result();
+    return Solution();
   }
 
  private:
@@ -131,7 +121,7 @@ class PoseGraphSolver {
     }
   }
 
-  std::optional<std::vector<Sim3>> Result() {
+  std::optional<std::vector<Sim3>> Solution() {
     std::vector<Sim3> result;
     for (size_t i = 0; i < nodes_.size(); ++i) {
       nodes_[i].Update();
@@ -151,41 +141,40 @@ class PoseGraphSolver {
 
 }  // namespace
 
-std::string PoseGraphProblem::Check() const {
+Result<> PoseGraphProblem::Check() const {
   const auto is_index = [&](int index) { return index >= 0 && static_cast<size_t>(index) < nodes.size(); };
   for (size_t i = 0; i < edges.size(); ++i) {
     const std::string name = "edge " + std::to_string(i);
     if (!is_index(edges[i].from) || !is_index(edges[i].to) || edges[i].from == edges[i].to) {
-      return name + " must name two different nodes of the problem";
+      return Failed(name + " must name two different nodes of the problem");
     }
     if (!(edges[i].weight > 0.0) || !(edges[i].length > 0.0) || !(edges[i].to_from_from.scale > 0.0)) {
-      return name + " has a weight, a length or a scale that is not positive";
+      return Failed(name + " has a weight, a length or a scale that is not positive");
     }
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
     if (!(nodes[i].world_from_keyframe.scale > 0.0)) {
-      return "node " + std::to_string(i) + " has a scale that is not positive";
+      return Failed("node " + std::to_string(i) + " has a scale that is not positive");
     }
   }
   if (std::none_of(nodes.begin(), nodes.end(), [](const PoseGraphNode& node) { return node.is_fixed; })) {
-    return "no node is fixed; fix one at least (gauge)";
+    return Failed("no node is fixed; fix one at least (gauge)");
   }
   return {};
 }
 
-std::string PoseGraphOptions::Check() const {
-  if (max_num_iterations < 1) return "a pose graph needs at least one iteration";
-  if (!(function_tolerance >= 0.0)) return "function_tolerance must not be negative";
+Result<> PoseGraphOptions::Check() const {
+  if (max_num_iterations < 1) return Failed("a pose graph needs at least one iteration");
+  if (!(function_tolerance >= 0.0)) return Failed("function_tolerance must not be negative");
   if (!(translation_sigma > 0.0) || !(rotation_sigma_rad > 0.0) || !(log_scale_sigma > 0.0)) {
-    return "translation_sigma, rotation_sigma_rad and log_scale_sigma must be positive";
+    return Failed("translation_sigma, rotation_sigma_rad and log_scale_sigma must be positive");
   }
   return {};
 }
 
 std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& problem, const PoseGraphOptions& options) {
-  for (const std::string& sentence : {problem.Check(), options.Check()}) {
-    if (!sentence.empty()) throw std::invalid_argument("OptimizePoseGraph: " + sentence);
-  }
+  ThrowIfFailed<std::invalid_argument>(problem.Check(), "OptimizePoseGraph: ");
+  ThrowIfFailed<std::invalid_argument>(options.Check(), "OptimizePoseGraph: ");
   if (!IsFinite(problem)) return std::nullopt;
   return problem.has_scale ? PoseGraphSolver<7>(problem, options).Solve()
                            : PoseGraphSolver<6>(problem, options).Solve();

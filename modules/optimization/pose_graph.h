@@ -1,4 +1,4 @@
-// Spreads the error of loops over the keyframes between: what is optimized are relative poses, not landmarks.
+// Pose graph optimization: distributes the error of loops over keyframes by their relative poses, without landmarks.
 #pragma once
 
 #include <optional>
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/ids.h"
+#include "core/result.h"
 #include "geometry/rigid3.h"
 
 namespace tessera {
@@ -16,15 +17,14 @@ struct PoseGraphNode {
   bool is_fixed = false;     // held where it is: the gauge
 };
 
-// What is known of two keyframes' relative pose: point_in_to = to_from_from * point_in_from.
+// A measured relative pose of two keyframes: point_in_to = to_from_from * point_in_from.
 struct PoseGraphEdge {
   int from = -1;  // indices into PoseGraphProblem::nodes
   int to = -1;
   Sim3 to_from_from;
   double weight = 1.0;  // of the squared residual; two edges alike are one of weight 2
-  // What translations are measured by, in the units of to_from_from's side `from`: the median depth of what the
-  // keyframe sees, or, without landmarks at hand, the distance of the two. It makes the result independent of the map's
-  // unit.
+  // The unit of translation errors, in units of `from`: the median depth of the landmarks that `from` observes or,
+  // without landmarks, the distance of the two keyframes. It makes the result independent of the map's unit.
   double length = 1.0;
 };
 
@@ -33,20 +33,20 @@ struct PoseGraphProblem {
   std::vector<PoseGraphEdge> edges;
   bool has_scale = true;  // mono: Sim(3); false: SE(3), all scales stay as given, to the bit
 
-  // Empty if well formed, else one sentence: indices in range, a fixed node, positive weights, lengths and scales.
-  std::string Check() const;
+  // Fails unless indices are in range, a node is fixed, and weights, lengths and scales are positive.
+  Result<> Check() const;
 };
 
 struct PoseGraphOptions {
   int max_num_iterations = 20;       // Levenberg-Marquardt steps; a loop of 3000 keyframes takes 5 to 10
   double function_tolerance = 1e-5;  // ends when a step lowers the cost by less than this part of it
-  // Standard deviations of what odometry gets wrong between two keyframes; only their ratios matter (README.md).
-  double translation_sigma = 0.01;  // as a part of PoseGraphEdge::length
+  // Standard deviations of odometry errors between two keyframes; only their ratios matter (README.md).
+  double translation_sigma = 0.01;  // in units of PoseGraphEdge::length
   double rotation_sigma_rad = 0.001;
   double log_scale_sigma = 0.01;
 
-  // Empty if all is well, else one sentence that says what is out of range.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Minimizes over the free S = world_from_keyframe, in Ceres (sparse Cholesky),

@@ -1,5 +1,5 @@
-// The bundle of a local window by Levenberg-Marquardt with a dense Schur complement, in fixed-size blocks. It takes the
-// steps that Ceres takes (BundleSolver, DENSE_SCHUR), up to rounding, in a fraction of the time: README.md has figures.
+// The bundle of a local window by Levenberg-Marquardt with a dense Schur complement, in fixed-size blocks. Its
+// steps are those of Ceres (BundleSolver, DENSE_SCHUR) up to rounding, in a fraction of the time (README.md).
 // Only this module's sources include this file.
 //
 // With J the derivatives of all whitened residuals by the poses (c) and the points (p), a step solves
@@ -42,7 +42,7 @@ class WindowSolver {
     size_t pose;
     int free_pose;  // its number among the free poses; -1: it is fixed
   };
-  // What a step would change.
+  // The change that a step proposes.
   struct Step {
     std::vector<Vector6d> poses;          // by free pose
     std::vector<Eigen::Vector3d> points;  // by point

@@ -12,7 +12,7 @@ struct BagOfWords {
   // (word, weight): each word once, ascending; weights are > 0 and sum up to 1.
   std::vector<std::pair<int32_t, float>> words;
   // The direct index, for guided matching: (node, keypoints below it), the nodes being those of one middle level of the
-  // tree; ascending, and so are the keypoints of each. Every keypoint stands in exactly one.
+  // tree; ascending, and so are the keypoints of each. Every keypoint is in exactly one.
   std::vector<std::pair<int32_t, std::vector<int32_t>>> nodes;
 
   bool operator==(const BagOfWords&) const = default;

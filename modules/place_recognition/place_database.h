@@ -18,7 +18,7 @@ class PlaceDatabase {
   struct Place {
     KeyframeId id;
     int32_t num_common_words = 0;
-    double score = 0.0;  // Similarity with what was asked for
+    double score = 0.0;  // Similarity with the query
 
     bool operator==(const Place&) const = default;
   };

@@ -37,26 +37,27 @@ std::vector<std::pair<int32_t, float>> WeighWords(const std::vector<std::pair<in
 
 }  // namespace
 
-std::string VocabularyTree::Check() const {
-  if (num_children.empty() || num_children.size() != centers.size()) return "it has not one center for each node";
+Result<> VocabularyTree::Check() const {
+  if (num_children.empty() || num_children.size() != centers.size())
+    return Failed("the numbers of its nodes and centers differ");
   int64_t num_reached = 1;  // the root
   size_t num_words = 0;
   for (size_t node = 0; node < num_children.size(); ++node) {
-    if (num_reached <= static_cast<int64_t>(node)) return "its nodes don't make up one tree";
+    if (num_reached <= static_cast<int64_t>(node)) return Failed("its nodes do not form one tree");
     num_reached += num_children[node];
     num_words += num_children[node] == 0 ? 1 : 0;
   }
-  if (num_reached != static_cast<int64_t>(num_children.size())) return "its nodes don't make up one tree";
-  if (num_words != idf.size()) return "it has not one weight for each word";
+  if (num_reached != static_cast<int64_t>(num_children.size())) return Failed("its nodes do not form one tree");
+  if (num_words != idf.size()) return Failed("the numbers of its words and weights differ");
   const bool are_weights_good =
       std::all_of(idf.begin(), idf.end(), [](float weight) { return std::isfinite(weight) && weight >= 0.0F; });
-  if (!are_weights_good) return "a weight is negative or no number";
-  if (direct_level < 0) return "the level of its direct index is negative";
-  return "";
+  if (!are_weights_good) return Failed("a weight is negative or not finite");
+  if (direct_level < 0) return Failed("the level of its direct index is negative");
+  return {};
 }
 
 Vocabulary::Vocabulary(VocabularyTree tree) : tree_(std::move(tree)) {
-  if (const std::string problem = tree_.Check(); !problem.empty()) throw std::invalid_argument(problem);
+  ThrowIfFailed<std::invalid_argument>(tree_.Check());
   int32_t next_child = 1;
   int32_t next_word = 0;
   first_child_.reserve(tree_.num_children.size());

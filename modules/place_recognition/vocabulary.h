@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "features/feature_types.h"
 #include "place_recognition/bag_of_words.h"
 
 namespace tessera {
 
-// What a vocabulary consists of. Nodes stand level by level, the root first, each level in the order of its parents;
-// so the children of a node are consecutive, and the number of children says everything about the shape.
+// The content of a vocabulary. Nodes are listed level by level, the root first, each level in the order of its parents;
+// so the children of a node are consecutive, and the numbers of children define the shape.
 struct VocabularyTree {
   static constexpr int32_t kMaxChildren = 255;
 
@@ -21,11 +22,11 @@ struct VocabularyTree {
   std::vector<Descriptor> centers;    // of each node; the root's is not used
   std::vector<float> idf;    // of each word, in the order of their nodes: ln(images / images that hold the word)
   int32_t direct_level = 0;  // the level of the direct index; the root is level 0
-  std::string origin;        // for people: what it was trained on, and how
+  std::string origin;        // for people: the training images and options
 
   bool operator==(const VocabularyTree&) const = default;
-  // Empty if the numbers fit together, else one sentence.
-  std::string Check() const;
+  // Fails unless the lists form one tree with a weight for each word.
+  Result<> Check() const;
 };
 
 class Vocabulary {
@@ -36,7 +37,7 @@ class Vocabulary {
   // Reads a file that Save wrote. Throws InputError if it is missing, no vocabulary, of another version, truncated or
   // damaged.
   static std::shared_ptr<const Vocabulary> Load(const std::string& path);
-  // Writes beside, then renames: there is never half a vocabulary under this name. Throws InputError if it can't.
+  // As WriteFile: there is never half a vocabulary under this name. Throws InputError if it can't be written.
   void Save(const std::string& path) const;
 
   // The image's bag, keypoint i being the one of descriptors[i]. The weight of a word is
@@ -44,7 +45,7 @@ class Vocabulary {
   //   w = n idf / sum over words of n idf,   n: descriptors of this word (tf-idf; the image's number of them cancels).
   //
   // From level to level a descriptor goes to the nearest child by Hamming distance, of equals the first. A word that
-  // every training image held says nothing and is left out.
+  // every training image contains carries no information and is left out.
   BagOfWords Describe(const std::vector<Descriptor>& descriptors) const;
 
   int32_t num_words() const { return static_cast<int32_t>(tree_.idf.size()); }

@@ -5,12 +5,11 @@
 //   of all that in 64 hexadecimal digits.
 #include <bit>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <string_view>
 #include <utility>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "core/sha256.h"
 #include "place_recognition/vocabulary.h"
 
@@ -89,20 +88,6 @@ std::string Encode(const VocabularyTree& tree) {
   return writer.text() + DigestOf(writer.text());
 }
 
-// The text of a file, or an InputError.
-std::string ReadWhole(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    throw InputError("vocabulary " + path + " does not exist: give a file that `tessera vocabulary train` wrote");
-  }
-  std::string text(static_cast<size_t>(std::filesystem::file_size(path, error)), '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (error || !file.read(text.data(), static_cast<std::streamsize>(text.size()))) {
-    throw InputError("vocabulary " + path + " can't be read: check its permissions");
-  }
-  return text;
-}
-
 struct Header {
   size_t num_nodes = 0;
   size_t num_words = 0;
@@ -150,28 +135,16 @@ VocabularyTree Decode(std::string_view text, const std::string& name) {
   reader.TakeAll(tree.num_children, header.num_nodes);
   reader.TakeAll(tree.centers, header.num_nodes);
   reader.TakeAll(tree.idf, header.num_words);
-  if (!tree.Check().empty()) throw InputError(name + kIsDamaged);
+  if (!tree.Check()) throw InputError(name + kIsDamaged);
   return tree;
 }
 
 }  // namespace
 
 std::shared_ptr<const Vocabulary> Vocabulary::Load(const std::string& path) {
-  return std::make_shared<const Vocabulary>(Decode(ReadWhole(path), "vocabulary " + path));
+  return std::make_shared<const Vocabulary>(Decode(ReadFile(path), "vocabulary " + path));
 }
 
-void Vocabulary::Save(const std::string& path) const {
-  const std::string unfinished = path + ".unfinished";
-  const std::string text = Encode(tree_);
-  std::ofstream file(unfinished, std::ios::binary | std::ios::trunc);
-  file.write(text.data(), static_cast<std::streamsize>(text.size()));
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(unfinished, path, error);
-  if (!file || error) {
-    std::filesystem::remove(unfinished, error);
-    throw InputError("vocabulary can't be written to " + path + ": check the folder and its free space");
-  }
-}
+void Vocabulary::Save(const std::string& path) const { WriteFile(path, Encode(tree_)); }
 
 }  // namespace tessera

@@ -162,17 +162,18 @@ std::vector<float> MeasureIdf(const VocabularyTree& tree, const std::vector<std:
 
 }  // namespace
 
-std::string VocabularyOptions::Check() const {
-  if (num_children < 2 || num_children > VocabularyTree::kMaxChildren) return "a node must have 2 to 255 children";
-  if (num_levels < 1 || num_levels > 10) return "a vocabulary must have 1 to 10 levels";
+Result<> VocabularyOptions::Check() const {
+  if (num_children < 2 || num_children > VocabularyTree::kMaxChildren)
+    return Failed("a node must have 2 to 255 children");
+  if (num_levels < 1 || num_levels > 10) return Failed("a vocabulary must have 1 to 10 levels");
   if (direct_level < 0 || direct_level > num_levels)
-    return "the direct index must be in one of the vocabulary's levels";
-  if (max_num_iterations < 1) return "a split takes at least one iteration";
-  return "";
+    return Failed("the direct index must be in one of the vocabulary's levels");
+  if (max_num_iterations < 1) return Failed("a split takes at least one iteration");
+  return {};
 }
 
 VocabularyTree TrainVocabulary(const std::vector<std::vector<Descriptor>>& images, const VocabularyOptions& options) {
-  if (const std::string problem = options.Check(); !problem.empty()) throw std::invalid_argument(problem);
+  ThrowIfFailed<std::invalid_argument>(options.Check());
   std::vector<Cluster> level(1);  // the nodes of one level of the tree
   for (const std::vector<Descriptor>& image : images) {
     level[0].members.insert(level[0].members.end(), image.begin(), image.end());

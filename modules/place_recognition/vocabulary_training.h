@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "place_recognition/vocabulary.h"
 
 namespace tessera {
@@ -16,8 +17,8 @@ struct VocabularyOptions {
   int max_num_iterations = 10;  // of each split; later ones move few descriptors
   uint64_t seed = 1;            // of the choice of the first centers
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Hierarchical k-medians in Hamming space (k-majority, Grana et al. 2013): the descriptors of a node are split around k

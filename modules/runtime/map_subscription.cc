@@ -13,18 +13,16 @@ constexpr std::chrono::milliseconds kAskAgain{300};
 
 }  // namespace
 
-MapSubscription::MapSubscription(StageContext& context, bool joins_late, std::function<void()> on_deltas)
-    : context_(context), on_deltas_(std::move(on_deltas)), follower_(joins_late) {
+MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply apply, std::function<void()> on_news)
+    : context_(context), apply_(std::move(apply)), on_news_(std::move(on_news)), follower_(joins_late) {
   requests_ = context.Advertise(kMapRequest);
   context.Subscribe(kMapDelta, [this](const MapDelta& delta) {
     follower_.Receive(std::make_shared<const MapDelta>(delta));
-    on_deltas_();
-    Ask();
+    ApplyAll();
   });
   context.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) {
     follower_.Receive(page);
-    on_deltas_();
-    Ask();
+    ApplyAll();
   });
   context.Every(kAskAgain, [this] {
     asked_.reset();
@@ -32,10 +30,32 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, std::fu
   });
 }
 
-void MapSubscription::Reject(const std::string& sentence) {
+void MapSubscription::FollowToEnd() {
+  context_.Subscribe(kEndOfStream, [this](const EndOfStream& end) { Receive(end); });
+}
+
+void MapSubscription::Receive(const EndOfStream& end) {
+  if (end.stage != StageKind::kMapper) return;
+  mapper_end_ = end;
+  follower_.Expect(end.num_values);
+  on_news_();
+}
+
+void MapSubscription::ApplyAll() {
+  for (const MapFollower::Delta& delta : follower_.Take()) {
+    if (const Result<> applied = apply_(delta); !applied) {
+      Reject(applied.error().sentence);
+      break;
+    }
+  }
+  on_news_();
+  Ask();
+}
+
+void MapSubscription::Reject(const std::string& reason) {
   follower_.Reject();
   context_.SetValue("map_rejected", static_cast<double>(++num_rejected_));
-  context_.ReportError("the map can't be followed, and is asked for anew: " + sentence);
+  context_.ReportError("the map can't be followed, and is asked for anew: " + reason);
 }
 
 // Each request once, until the next one or the timer: an answer is on its way.

@@ -1,4 +1,4 @@
-// A town along given streets: what stands where is drawn by seed, and never in the way of the drive.
+// A town along given streets: objects are placed by seed, and never in the way of the drive.
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +8,7 @@
 namespace tessera {
 namespace {
 
-// The drive cuts corners at crossings; so near its line nothing stands.
+// The drive cuts corners at crossings; no object is so near its line.
 constexpr double kDriveGapM = 2.2;
 
 // A position beside a street.
@@ -28,7 +28,7 @@ class StreetBuilder {
     for (const Polyline& street : plan_.streets) {
       for (const double side : {1.0, -1.0}) {
         BuildHouses(street, side);
-        BuildKurbs(street, side);
+        BuildCurbs(street, side);
         BuildVerge(street, side);
         ParkCars(street, side);
       }
@@ -101,7 +101,7 @@ class StreetBuilder {
     BuildBays(b, a, -spot.out, height);
   }
 
-  // Bays and balconies stand out of a facade, so that it is no mere plane.
+  // Bays and balconies give a facade depth.
   void BuildBays(const Eigen::Vector2d& left, const Eigen::Vector2d& right, const Eigen::Vector2d& out, double height) {
     const double width = (right - left).norm();
     const int num_bays = random_.Index(3);
@@ -119,7 +119,7 @@ class StreetBuilder {
     }
   }
 
-  void BuildKurbs(const Polyline& street, double side) {
+  void BuildCurbs(const Polyline& street, double side) {
     const Polyline posts = Resample(street, 4.0);
     for (size_t i = 0; i + 1 < posts.size(); ++i) {
       const Spot here = SpotAt(posts, i, side);
@@ -128,13 +128,13 @@ class StreetBuilder {
       const Eigen::Vector2d b = next.on_middle + kCurbM * next.out;
       if (world_.streets->DistanceToStreet(a) < kCurbM - 0.1 || world_.streets->DistanceToStreet(b) < kCurbM - 0.1)
         continue;
-      const int32_t paint = builder_.AddPaint({Material::kKurb, random_.Next(), 4.0, 0.13, 0.02});
+      const int32_t paint = builder_.AddPaint({Material::kCurb, random_.Next(), 4.0, 0.13, 0.02});
       // Seen from the road, whose side is left of `along`.
       builder_.Add(side > 0.0 ? builder_.Wall(b, a, 0.0, 0.13, paint) : builder_.Wall(a, b, 0.0, 0.13, paint));
     }
   }
 
-  // Trees, lamps, signs, hedges and fences between kurb and houses.
+  // Trees, lamps, signs, hedges and fences between curb and houses.
   void BuildVerge(const Polyline& street, double side) {
     const Polyline posts = Resample(street, 1.0);
     for (size_t i = 1; i + 1 < posts.size(); i += 2 + static_cast<size_t>(random_.Index(7))) {

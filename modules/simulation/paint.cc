@@ -19,7 +19,7 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
     case Material::kGround:
       if (map == nullptr) throw std::invalid_argument("ground needs a street map");
       return PaintGround(spec, *map);
-    case Material::kKurb:
+    case Material::kCurb:
       return PaintPlain(spec, 150.0, 14.0, 14.0);
     case Material::kFoliage:
       return PaintFoliage(spec);

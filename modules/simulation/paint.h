@@ -12,8 +12,8 @@ class StreetMap;
 
 enum class Material {
   kFacade,  // windows, doors, shop fronts; plaster or brick
-  kGround,  // road, kurb, pavement and grass, as the street map says for `origin`
-  kKurb,
+  kGround,  // road, curb, pavement and grass, as the street map says for `origin`
+  kCurb,
   kFoliage,  // leaves with holes between them
   kBark,
   kHedge,
@@ -58,7 +58,7 @@ Texture PaintWallpaper(const PaintSpec& spec);
 Texture PaintPoster(const PaintSpec& spec);
 Texture PaintBooks(const PaintSpec& spec);
 Texture PaintWood(const PaintSpec& spec);
-// Of one tone with this grain: bark, kurbs, car roofs, carpets, ceilings, hedges.
+// Of one tone with this grain: bark, curbs, car roofs, carpets, ceilings, hedges.
 Texture PaintPlain(const PaintSpec& spec, double tone, double fine, double coarse);
 
 }  // namespace tessera

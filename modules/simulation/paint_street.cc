@@ -1,4 +1,4 @@
-// What stands in a street, and its ground.
+// Paint of objects in a street, and of its ground.
 #include <algorithm>
 #include <cmath>
 

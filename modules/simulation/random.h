@@ -21,7 +21,7 @@ inline uint32_t HashOf(uint32_t a, uint32_t b = 0, uint32_t c = 0, uint32_t d = 
   return h;
 }
 
-// The number in [0, 1) that the hash stands for.
+// Maps a hash to [0, 1).
 inline float UnitOf(uint32_t hash) { return static_cast<float>(hash >> 8) * (1.0F / 16777216.0F); }
 
 // A sequence of random numbers. Draw at most one in the arguments of a call: C++ leaves their order open (in braces it

@@ -82,13 +82,13 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
 
 }  // namespace
 
-std::string SimulationOptions::Check() const {
-  if (!(length_m >= 0.0 && length_m < 1e5)) return "sim: length must lie between 0 and 100000 m";
-  if (!(duration_s > 0.0 && duration_s < 1e5)) return "sim: duration must lie between 0 and 100000 s";
-  if (!(speed >= 0.05 && speed <= 10.0)) return "sim: speed must lie between 0.05 and 10 times the usual";
-  if (!(noise >= 0.0 && noise <= 20.0)) return "sim: noise must lie between 0 and 20 times the usual";
-  if (!(scale >= 0.1 && scale <= 4.0)) return "sim: scale must lie between 0.1 and 4 times the usual";
-  return "";
+Result<> SimulationOptions::Check() const {
+  if (!(length_m >= 0.0 && length_m < 1e5)) return Failed("sim: length must be between 0 and 100000 m");
+  if (!(duration_s > 0.0 && duration_s < 1e5)) return Failed("sim: duration must be between 0 and 100000 s");
+  if (!(speed >= 0.05 && speed <= 10.0)) return Failed("sim: speed must be between 0.05 and 10 times the usual");
+  if (!(noise >= 0.0 && noise <= 20.0)) return Failed("sim: noise must be between 0 and 20 times the usual");
+  if (!(scale >= 0.1 && scale <= 4.0)) return Failed("sim: scale must be between 0.1 and 4 times the usual");
+  return {};
 }
 
 SimulationOptions ParseSimulation(const std::string& text) {
@@ -108,13 +108,13 @@ SimulationOptions ParseSimulation(const std::string& text) {
     SetOption(option.substr(0, equals), option.substr(equals + 1), options);
     begin = end;
   }
-  if (const std::string problem = options.Check(); !problem.empty()) throw InputError(problem);
+  ThrowIfFailed<InputError>(options.Check());
   return options;
 }
 
 Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
     : options_(options), camera_(MakeCamera(options, sensor)) {
-  if (const std::string problem = options.Check(); !problem.empty()) throw InputError(problem);
+  ThrowIfFailed<InputError>(options.Check());
   if (IsStreet(options.scene)) {
     const StreetPlan plan = MakePlan(options);
     trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed);

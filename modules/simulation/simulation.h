@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "core/result.h"
 #include "geometry/camera_frame.h"
 #include "simulation/camera_effects.h"
 #include "simulation/drive.h"
@@ -23,8 +24,8 @@ struct SimulationOptions {
   double scale = 1.0;        // times the usual size of images
   std::string path;          // a drive along the poses of a KITTI file instead of through the town
 
-  // Empty if all is well, else one sentence.
-  std::string Check() const;
+  // Fails if a value is out of range.
+  Result<> Check() const;
 };
 
 // Reads "street", "street-short" or "room", and options behind it: "street,seed=3,length=500". Throws InputError.
@@ -40,9 +41,9 @@ class Simulation {
   int64_t num_frames() const { return num_frames_; }
   int64_t UtimeOf(FrameId frame) const;
   Rigid3 WorldFromCamera(FrameId frame) const;
-  // Frames may be asked for in any order.
+  // Frames may be rendered in any order.
   CameraFrame Render(FrameId frame);
-  // What is seen before the camera adds its faults.
+  // The picture before the effects of the camera.
   void RenderPerfect(FrameId frame, Rendering& out);
 
  private:

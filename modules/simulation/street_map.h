@@ -7,7 +7,7 @@
 
 namespace tessera {
 
-// Across a street, from its middle: two lanes, parked cars, kurb, pavement, then the lots.
+// Across a street, from its middle: two lanes, parked cars, curb, pavement, then the lots.
 inline constexpr double kRoadHalfWidthM = 3.5;
 inline constexpr double kCurbM = 5.7;
 inline constexpr double kLotLineM = 8.0;

@@ -1,21 +1,11 @@
-// What the POSEs of a recorded run say about its schedule: which step of the map each frame was tracked with.
+// Reads the schedule of a recorded run from its log.
 #pragma once
 
-#include <cstdint>
-#include <map>
 #include <string>
 
-#include "core/ids.h"
-#include "messages/loop_types.h"
+#include "messages/recorded_steps.h"
 
 namespace tessera {
-
-struct RecordedSteps {
-  std::map<FrameId, int64_t> steps;           // deltas that the map had seen, by frame; empty: the log holds no POSE
-  std::map<FrameId, FrameId> relocalized_by;  // by frame, where one was
-  std::map<FrameId, RelocalizationAnswer> relocalizations;  // by the frame that asked: those that were used
-  bool is_live = false;  // the steps are what happened to be there: a replay must follow them
-};
 
 // Throws InputError: no such file, not an LCM log, cut in the middle, a POSE that makes no sense.
 RecordedSteps ReadRecordedSteps(const std::string& path, const std::string& channel_prefix);

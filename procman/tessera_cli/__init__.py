@@ -1,1 +1,1 @@
-"""The `tessera` command behind `setup`: starts and watches the processes of a run, and reports what came out."""
+"""The `tessera` command: runs of the stack, the processes behind them, and reports of their results."""

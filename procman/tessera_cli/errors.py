@@ -1,9 +1,9 @@
-"""The two ways a command fails. Each holds one sentence for the user."""
+"""The two ways in which a command fails; each exception holds one sentence for the user."""
 
 
 class UserError(Exception):
-    """The arguments or the input are at fault: exit status 2."""
+    """The arguments or the input are wrong: exit status 2."""
 
 
-class RunFailed(Exception):
-    """What was asked for began, and did not end well: exit status 1."""
+class RunError(Exception):
+    """What was asked for was started and did not end well: exit status 1."""

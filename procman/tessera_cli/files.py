@@ -1,23 +1,25 @@
-"""Writing files that nobody ever sees half-written, and the places of this checkout."""
+"""The folders of this checkout, and files that are written whole or not at all."""
 
 import os
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# TESSERA_BUILD: another build of the same sources, for those who work on them.
+PROCMAN = ROOT / "procman"
+# TESSERA_BUILD: another build of the same sources, for developers.
 BUILD = Path(os.environ.get("TESSERA_BUILD", ROOT / "build"))
 BIN = BUILD / "bin"
 
 
 def unfinished(path: Path) -> Path:
-    """Name under which `path` is written until it is whole; keeps the suffix, which some writers look at."""
+    """The name under which `path` is written until it is complete; it keeps the suffix, which some writers look at."""
     return path.with_name(f".unfinished-{path.name}")
 
 
 @contextmanager
-def replacing(path: Path):
-    """Gives the name to write to; it becomes `path` at the end, and nothing is left if writing fails or is interrupted."""
+def replacing(path: Path) -> Iterator[Path]:
+    """Yields the name to write to, which becomes `path` at the end. Nothing is left if writing fails."""
     written = unfinished(path)
     try:
         yield written
@@ -27,5 +29,11 @@ def replacing(path: Path):
 
 
 def write_text(path: Path, text: str) -> None:
+    """Writes `path` whole or not at all."""
     with replacing(path) as written:
         written.write_text(text)
+
+
+def absolute(text: str) -> Path:
+    """A path as typed by a user, absolute and with ~ replaced."""
+    return Path(text).expanduser().absolute()

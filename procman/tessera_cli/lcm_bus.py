@@ -1,38 +1,40 @@
-"""The bus between sheriffs and deputies, and how any bus is listened to without blocking."""
+"""The only module that uses LCM: buses, their URLs, and recorded logs."""
 
 import os
-import struct
+import select
 import time
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
 
 import lcm
 
-from tessera_cli.errors import RunFailed
-from tessera_cli.messages import header_t
-from tessera_cli.settings import GROUP
-
-PORT_OFFSET = 3  # from the base port: 7667 -> 7670
-QUEUE_CAPACITY = 1000
-ORDER, STATUS, OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
-DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
-# Messages handled before the loop looks at its processes again.
-MAX_MESSAGES_A_TURN = 200
+from tessera_cli.constants import MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
+from tessera_cli.errors import RunError
+from tessera_cli.messages import decode, header_t
 
 
-def ttl_of(arguments: Namespace) -> int:
-    """1 with --lan or TESSERA_LAN=1, else 0: nothing leaves this machine."""
-    return int(arguments.lan or os.environ.get("TESSERA_LAN", "") == "1")
+def bus_url(port: int, time_to_live: int = 0) -> str:
+    """`time_to_live` 0: multicast that stays on this machine."""
+    return f"udpm://{MULTICAST_GROUP}:{port}?ttl={time_to_live}"
+
+
+def is_on_lan(arguments: Namespace) -> bool:
+    """Whether messages leave this machine: --lan, or TESSERA_LAN=1 in the environment."""
+    return arguments.lan or os.environ.get("TESSERA_LAN", "") == "1"
 
 
 def procman_url(arguments: Namespace) -> str:
-    return f"udpm://{GROUP}:{arguments.port + PORT_OFFSET}?ttl={ttl_of(arguments)}"
+    """The bus between sheriffs and deputies."""
+    return bus_url(arguments.port + PORT_OFFSETS["procman"], int(is_on_lan(arguments)))
 
 
 class Bus:
-    """One LCM instance."""
+    """One LCM instance. `publisher` names this process in the headers of what it sends."""
 
     def __init__(self, url: str, publisher: str) -> None:
+        """Raises RunError if the bus can't be opened."""
         self.url = url
         self._publisher = publisher
         self._epoch_us = int(time.time() * 1e6)
@@ -40,33 +42,40 @@ class Bus:
         try:
             self._lcm = lcm.LCM(url)
         except RuntimeError as error:
-            raise RunFailed(_explain(url, error)) from error
+            raise RunError(_explain(url, str(error))) from error
 
-    def subscribe(self, channel: str, message_type, handler: Callable) -> None:
-        """`handler` gets decoded messages, or bytes where `message_type` is None. What makes no sense is left out."""
+    def subscribe(self, channel: str, message_type: Any, handler: Callable[[Any], None]) -> Any:
+        """`handler` gets decoded messages, or bytes where `message_type` is None. Invalid messages are ignored.
+
+        Returns the subscription, for `unsubscribe`.
+        """
 
         def on_message(_channel: str, data: bytes) -> None:
-            try:
-                message = data if message_type is None else message_type.decode(data)
-            except DECODE_ERRORS:
-                return
-            handler(message)
+            message = data if message_type is None else decode(message_type, data)
+            if message is not None:
+                handler(message)
 
-        # None: the port is taken by a program that shares it with nobody, or LCM's self-test heard nothing.
+        # None: another program holds the port exclusively, or LCM's self-test received nothing.
         subscription = self._lcm.subscribe(channel, on_message)
         if subscription is None:
-            raise RunFailed(_explain(self.url, "nothing can be received"))
+            raise RunError(_explain(self.url, "nothing can be received"))
         subscription.set_queue_capacity(QUEUE_CAPACITY)
+        return subscription
+
+    def unsubscribe(self, subscription: Any) -> None:
+        self._lcm.unsubscribe(subscription)
 
     def fileno(self) -> int:
         return self._lcm.fileno()
 
     def handle_waiting(self) -> None:
-        for _ in range(MAX_MESSAGES_A_TURN):
+        """Handles messages that have arrived, without waiting for more."""
+        for _ in range(MAX_MESSAGES_PER_TURN):
             if self._lcm.handle_timeout(0) <= 0:
                 return
 
     def header(self, channel: str) -> header_t:
+        """The header of the next message that this process sends on `channel`."""
         header = header_t()
         header.publisher, header.epoch_us, header.utime = self._publisher, self._epoch_us, int(time.time() * 1e6)
         header.sequence = self._sequences.get(channel, 0)
@@ -75,15 +84,33 @@ class Bus:
         return header
 
     def publish(self, channel: str, data: bytes) -> None:
-        """A link that is down loses it, as any network may; who needs an answer asks again."""
+        """The message is lost if the link is down, as on any network: whoever needs an answer repeats it."""
         try:
             self._lcm.publish(channel, data)
         except (OSError, RuntimeError):
             pass
 
 
-def _explain(url: str, why: object) -> str:
+def listen(buses: Sequence[Bus], seconds: float) -> None:
+    """Handles what arrives within this time. (LCM's own waiting would turn a signal into an error.)"""
+    deadline = time.monotonic() + seconds
+    while (left_s := deadline - time.monotonic()) > 0:
+        for bus in select.select(buses, [], [], left_s)[0]:
+            bus.handle_waiting()
+
+
+def log_messages(path: Path, channel: str) -> Iterator[bytes]:
+    """The data of all events of a recorded log on one channel."""
+    log = lcm.EventLog(str(path), "r")
+    try:
+        yield from (event.data for event in log if event.channel == channel)
+    finally:
+        log.close()
+
+
+def _explain(url: str, reason: str) -> str:
     return (
-        f"the bus {url} can't be opened ({why}). Does another program hold its port (ss -ulpn shows which; --port N takes others)? "
-        "Is multicast possible? Try: sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo (with --lan: dev the network's device)"
+        f"the bus {url} can't be opened ({reason}). Does another program hold its port (ss -ulpn shows which; "
+        "--port N selects others)? Is multicast possible? Try: sudo ip link set lo multicast on; "
+        "sudo ip route add 224.0.0.0/4 dev lo (with --lan: dev the network's device)"
     )

@@ -1,6 +1,8 @@
-"""The message types that the build generates from lcmtypes/."""
+"""The message types that the build generates from lcmtypes/, and how their bytes are decoded."""
 
+import struct
 import sys
+from typing import Any
 
 from tessera_cli.files import BUILD
 
@@ -23,6 +25,7 @@ from tessera import (
 
 __all__ = [
     "camera_image_t",
+    "decode",
     "end_of_stream_t",
     "header_t",
     "heartbeat_t",
@@ -35,3 +38,14 @@ __all__ = [
     "procman_wish_t",
     "stage_status_t",
 ]
+
+# What generated code raises on bytes that are no such message.
+_DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
+
+
+def decode(message_type: Any, data: bytes) -> Any | None:
+    """The message, or None if the bytes are not a valid one of this type."""
+    try:
+        return message_type.decode(data)
+    except _DECODE_ERRORS:
+        return None

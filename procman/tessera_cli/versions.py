@@ -1,4 +1,4 @@
-"""What a run was made with: the commit, the libraries that the build found, and the machine."""
+"""What a run was made with: Tessera's version and commit, the libraries that the build found, and the machine."""
 
 import datetime
 import json
@@ -10,13 +10,19 @@ from pathlib import Path
 from tessera_cli.files import BUILD, ROOT
 
 
+def tessera_version() -> str:
+    """Of the file VERSION, which CMake reads too; "unknown" if there is none."""
+    try:
+        return (ROOT / "VERSION").read_text().strip()
+    except OSError:
+        return "unknown"
+
+
 def collect_versions() -> dict[str, str]:
-    """Names and versions, in the order in which to show them. What can't be found out is left out."""
-    built = _of_build(BUILD / "versions.json")
+    """Names and versions, in the order in which to show them. What is unknown is left out."""
     commit = _commit()
-    versions = {
-        "Tessera": built.pop("Tessera", "") + (f", commit {commit}" if commit else ""),
-        **built,
+    versions = _of_build(BUILD / "versions.json") | {
+        "Tessera": tessera_version() + (f", commit {commit}" if commit else ""),
         "Python": platform.python_version(),
         "system": f"{_system()}, Linux {platform.release()}",
         "CPU": f"{_cpu()}, {os.cpu_count()} cores",
@@ -34,19 +40,19 @@ def _commit() -> str:
 
     try:
         commit = git("rev-parse", "--short=12", "HEAD")
-        return commit + (
-            ", with changes that are not committed" if commit and git("status", "--porcelain", "-uno") else ""
-        )
+        is_changed = bool(commit and git("status", "--porcelain", "-uno"))
     except OSError:
         return ""
+    return commit + (", with changes that are not committed" if is_changed else "")
 
 
 def _of_build(path: Path) -> dict[str, str]:
     """What CMake found when it configured the build."""
     try:
-        return json.loads(path.read_text())
+        found = json.loads(path.read_text())
     except (OSError, ValueError):
         return {}
+    return {name: version for name, version in found.items() if name.lower() != "tessera"}
 
 
 def _system() -> str:

@@ -136,12 +136,12 @@ class Mapping {
 void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& tracker_options, int64_t map_delay_frames,
           OfflineRun& run) {
   MapTracker tracker(tracker_options);
-  DeltaSchedule schedule(map_delay_frames);
+  LogicalTime time(map_delay_frames);
   Mapping mapping(run);
   bool was_lost = false;
   for (const FeatureFrame& features : frames) {
     const MapTrackingResult result = Measure(run.track_ms, [&] {
-      for (const auto& delta : schedule.Take(features.frame)) {
+      for (const auto& delta : time.TakeDeltas(features.frame)) {
         ThrowIfFailed<InputError>(tracker.ApplyDelta(*delta));
       }
       return tracker.Track(features);
@@ -152,8 +152,8 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
     run.num_failures += is_lost && !was_lost ? 1 : 0;
     was_lost = is_lost;
     for (const KeyframeObservation& keyframe : result.keyframes) {
-      schedule.KeyframeSent(keyframe.id, features.frame);
-      schedule.Receive(mapping.Process(keyframe));
+      time.KeyframeSent(keyframe.id, features.frame);
+      time.Receive(mapping.Process(keyframe));
     }
   }
   mapping.Finish();

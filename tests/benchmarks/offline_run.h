@@ -10,8 +10,8 @@
 #include "features/feature_types.h"
 #include "loop_closing/loop_closer.h"
 #include "mapping/mapper.h"
-#include "tracking/delta_schedule.h"
 #include "tracking/map_tracker.h"
+#include "tracking/tracker_time.h"
 
 namespace tessera {
 

@@ -28,13 +28,13 @@ Record MakeRecord(int num_features) {
   record.frames = ExtractSequence(source, {.num_features = num_features}, false).frames;
   MapTracker tracker{MapTrackerOptions{}};
   Mapper mapper{MapperOptions{}};
-  DeltaSchedule schedule(kMapDelayFrames);
+  LogicalTime time(kMapDelayFrames);
   for (const FeatureFrame& frame : record.frames) {
-    record.deltas.push_back(schedule.Take(frame.frame));
+    record.deltas.push_back(time.TakeDeltas(frame.frame));
     for (const auto& delta : record.deltas.back()) (void)tracker.ApplyDelta(*delta);
     for (const KeyframeObservation& keyframe : tracker.Track(frame).keyframes) {
-      schedule.KeyframeSent(keyframe.id, frame.frame);
-      schedule.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
+      time.KeyframeSent(keyframe.id, frame.frame);
+      time.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
       record.keyframes.push_back(keyframe);
     }
   }

@@ -1,6 +1,7 @@
 #include "datasets/calibration_file.h"
 
 #include "support/dataset_folder.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -11,7 +12,7 @@ TEST(CalibrationFile, ShippedFilesLoad) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(TESSERA_SOURCE_DIR "/config/cameras")) {
     const CameraRig rig = LoadCalibrationFile(entry.path());
-    EXPECT_EQ(rig.Check(SensorType::kMono), "") << entry.path();
+    EXPECT_THAT(rig.Check(SensorType::kMono), IsSuccess()) << entry.path();
     ++count;
   }
   EXPECT_GT(count, 0);
@@ -42,9 +43,9 @@ TEST(CalibrationFile, BaselineStandsForARectifiedPair) {
   const DatasetFolder folder;
   folder.Write("c.yaml", std::string(kPinhole) + "baseline_m: 0.54\n");
   const CameraRig rig = LoadCalibrationFile(folder.path("c.yaml"));
-  EXPECT_EQ(rig.Check(SensorType::kStereo), "");
+  EXPECT_THAT(rig.Check(SensorType::kStereo), IsSuccess());
   EXPECT_EQ(rig.right_from_left.translation.x(), -0.54);
-  EXPECT_NE(rig.Check(SensorType::kRgbd), "");
+  EXPECT_FALSE(rig.Check(SensorType::kRgbd));
 }
 
 TEST(CalibrationFile, BadFilesGetASentence) {

@@ -12,7 +12,7 @@ CameraFrame FromSource(int64_t id) {
   return frame;
 }
 
-TEST(Renumbering, ACameraThatIsStartedAgainGoesOnBehindWhatIsOnItsWay) {
+TEST(Renumbering, ARestartedCameraContinuesAfterTheFramesOnTheirWay) {
   Renumbering renumbering(38);
   CameraFrame first = FromSource(0);
   renumbering.Apply(first);

@@ -270,7 +270,7 @@ TEST(Relocalization, FindsACameraInEachUnitOfTheMap) {
   }
 }
 
-TEST(Relocalization, SaysSoWhereItWasNever) {
+TEST(Relocalization, HasNoAnswerForAnUnknownPlace) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
   PlantedMap planted(world);
   for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {k - 1});

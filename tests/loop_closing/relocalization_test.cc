@@ -74,7 +74,7 @@ MapTrackerOptions ShortSighted() {
   return options;
 }
 
-TEST(Relocalization, ATrackerThatWasCarriedOffAsksAndGoesOnInTheSameMap) {
+TEST(Relocalization, ATrackerThatWasCarriedAwayAsksAndContinuesInTheSameMap) {
   Carried run(ShortSighted());
   run.Drive(0, kFar);
   const FeatureFrame features = run.Take(2);
@@ -115,7 +115,7 @@ TEST(Relocalization, WithoutAnAnswerTheFrameIsLost) {
 }
 
 // The tracker checks what it is told against its own map.
-TEST(Relocalization, AnAnswerThatDoesNotHoldIsNotBelieved) {
+TEST(Relocalization, AnAnswerThatTheMapContradictsIsRejected) {
   Carried run(ShortSighted());
   run.Drive(0, kFar);
   const FeatureFrame features = run.Take(2);
@@ -156,7 +156,7 @@ TEST(Relocalization, ALateAnswerPlacesTheFramesAfterTheOneThatAsked) {
   EXPECT_FALSE(run.tracker.Track(run.Take(5), &stale, false).pose.relocalized_by.valid());
 }
 
-TEST(Relocalization, BlackImagesAskNobody) {
+TEST(Relocalization, BlackImagesAskForNothing) {
   Carried run;
   run.Drive(0, 5);
   FeatureFrame black = run.Take(6);
@@ -210,11 +210,11 @@ TEST(Relocalization, LocalizingOnlyMakesNoKeyframes) {
   }
 }
 
-TEST(Relocalization, AMapThatWasLoadedIsGoneOnWith) {
+TEST(Relocalization, ALoadedMapIsContinued) {
   KeyframeId last;
   const MapDelta made = MadeMap(&last);
   Carried run;
-  ASSERT_EQ(run.mapper.Load(made), "");
+  ASSERT_THAT(run.mapper.Load(made), IsSuccess());
   run.Apply(made);
   EXPECT_EQ(run.tracker.last_keyframe(), last);
   const FeatureFrame features = run.Take(15);

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "map/spanning_tree.h"
-#include "optimization/global_adjustment.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 
@@ -224,51 +223,6 @@ TEST(MapCorrection, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
     EXPECT_LT((landmark.position_in_world - correction * before.FindLandmark(id)->position_in_world).norm(), 1e-9);
   });
   EXPECT_EQ(planted.map().FindLandmark(gone), nullptr);
-}
-
-// The map is deformed by up to a meter; the observations are right.
-TEST(GlobalAdjustment, BringsADeformedMapNearerToTheTruth) {
-  for (const SensorType sensor : {SensorType::kStereo, SensorType::kMono}) {
-    SyntheticWorld world(sensor, 0.3);
-    PlantedMap planted(world);
-    for (int64_t k = 0; k < 20; ++k) planted.Add(k, {k - 1});
-    Map& map = planted.map();
-    EditBoth(map, [&](MapEditor& editor) {
-      Corrections corrections;
-      for (int64_t k = 0; k < 20; ++k) {
-        const double way = static_cast<double>(k) / 20.0;
-        corrections[{k}] = Sim3::From({ExpSO3({0.0, 0.05 * way * way, 0.0}), {way * way, 0.0, 0.0}});
-      }
-      ApplyCorrections(corrections, editor);
-    });
-    const double before = planted.WorstKeyframe(map);
-    EXPECT_GT(before, 0.5);
-    const GlobalAdjustment adjustment = AdjustGlobally(map, {12}, GlobalBundleOptions());
-    ASSERT_TRUE(adjustment.is_usable);
-    EXPECT_EQ(adjustment.answers, KeyframeId{12});
-    EditBoth(map, [&](MapEditor& editor) { ApplyAdjustment(adjustment, TakeBase(map), editor); });
-    // Mono: the root stays, and so does the length of the second keyframe's way, so the scale is known to a few
-    // percent.
-    const double share = sensor == SensorType::kStereo ? 0.1 : 0.3;
-    EXPECT_LT(planted.WorstKeyframe(map), share * before) << ToString(sensor);
-  }
-}
-
-TEST(GlobalAdjustment, MovesOnlyThePartThatWasAskedFor) {
-  SyntheticWorld world(SensorType::kStereo, 0.3);
-  TwoVisits visits(world, Sim3{1.0, kAway.rotation, kAway.translation});
-  const Map& map = visits.planted().map();
-  const GlobalAdjustment adjustment = AdjustGlobally(map, {6}, GlobalBundleOptions());
-  for (const auto& pose : adjustment.poses) {
-    EXPECT_EQ(RootOf(map, pose.id), KeyframeId{4});
-    if (pose.id != KeyframeId{4}) continue;
-    EXPECT_LT((pose.world_from_camera.translation - map.FindKeyframe({4})->world_from_camera.translation).norm(),
-              1e-12);
-  }
-  for (const auto& point : adjustment.points) {
-    EXPECT_GE(map.ObservationsOf(point.id).front().keyframe.value, 4);
-  }
-  EXPECT_THROW((void)AdjustGlobally(map, {99}, GlobalBundleOptions()), std::invalid_argument);
 }
 
 }  // namespace

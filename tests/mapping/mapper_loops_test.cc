@@ -15,14 +15,14 @@ namespace {
 
 const Sim3 kAway{1.0, ExpSO3({0.0, 0.6, 0.0}), {30.0, 1.0, -3.0}};
 
-// A mapper whose map holds a place twice: keyframes 0 .. 5, and 6 .. 11 in another part, far from it. The next ones go
-// on in the second part.
+// A mapper whose map holds a place twice: keyframes 0 .. 5, and 6 .. 11 in another part, far from it. The next ones
+// continue in the second part.
 class LoopMapper : public testing::Test {
  protected:
   LoopMapper() {
     for (int64_t k = 0; k < 6; ++k) planted_.Add(k, {k - 1}, 0);
     for (int64_t k = 6; k < 12; ++k) planted_.Add(k - 6, k == 6 ? KeyframeId{} : KeyframeId{k - 1}, 1, kAway);
-    EXPECT_EQ(mapper_.Load(planted_.map().Snapshot()), "");
+    EXPECT_THAT(mapper_.Load(planted_.map().Snapshot()), IsSuccess());
     EXPECT_THAT(replica_.Apply(planted_.map().Snapshot()), IsSuccess());
   }
 
@@ -118,7 +118,7 @@ TEST_F(LoopMapper, ALoopFoundBeforeTheLastCorrectionIsIgnored) {
   EXPECT_EQ(mapper_.num_void_loops(), 2);
 }
 
-TEST_F(LoopMapper, AnAdjustmentOfTheMapIsAppliedAndThenAnotherMayBeAskedFor) {
+TEST_F(LoopMapper, AnAdjustmentIsAppliedAndThenAnotherMayBeRequested) {
   Step();
   Step({{LoopAt({12}, {5})}, {}});
   ASSERT_TRUE(delta_.asks_adjustment);
@@ -131,7 +131,7 @@ TEST_F(LoopMapper, AnAdjustmentOfTheMapIsAppliedAndThenAnotherMayBeAskedFor) {
   EXPECT_LT(WorstKeyframe(), 0.05);
 }
 
-TEST_F(LoopMapper, AnAdjustmentThatComesAfterAnotherLoopIsVoidAndAskedForAnew) {
+TEST_F(LoopMapper, AnAdjustmentOutdatedByAnotherLoopIsIgnoredAndRequestedAgain) {
   Step();
   Step({{LoopAt({12}, {5})}, {}});
   ASSERT_TRUE(delta_.asks_adjustment);
@@ -151,7 +151,7 @@ TEST_F(LoopMapper, AnAdjustmentThatComesAfterAnotherLoopIsVoidAndAskedForAnew) {
   EXPECT_TRUE(delta_.asks_adjustment);
 }
 
-TEST_F(LoopMapper, AnAdjustmentThatIsOfNoUseChangesNothing) {
+TEST_F(LoopMapper, AnUnusableAdjustmentChangesNothing) {
   Step();
   Step({{LoopAt({12}, {5})}, {}});
   GlobalAdjustment useless;

@@ -339,12 +339,12 @@ TEST(AdjustBundle, MalformedProblemsThrowWithASentence) {
   for (size_t i = 0; i < spoilers.size(); ++i) {
     BundleProblem problem = bundle.problem;
     spoilers[i](problem);
-    EXPECT_FALSE(problem.Check().empty()) << i;
+    EXPECT_FALSE(problem.Check()) << i;
     EXPECT_THROW(AdjustBundle(problem, {}), std::invalid_argument) << i;
   }
   EXPECT_THROW(AdjustBundle(bundle.problem, {.max_num_iterations = 0}), std::invalid_argument);
   EXPECT_THROW(AdjustBundle(bundle.problem, {.initial_radius = 0.0}), std::invalid_argument);
-  EXPECT_TRUE(GlobalBundleOptions().Check().empty());
+  EXPECT_TRUE(GlobalBundleOptions().Check());
 }
 
 }  // namespace

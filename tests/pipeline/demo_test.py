@@ -3,13 +3,13 @@
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tessera_cli.cli.arguments import DEMO_FRAMES
-from tessera_cli.runs.demo import log_name
-
-from conftest import RUN_TIMEOUT_S
+from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera
+from tessera_cli.cli.commands.demo import NUM_FRAMES as DEMO_FRAMES
+from tessera_cli.cli.commands.demo import RENDERED_BY, log_name
 
 FRAMES = 60
 
@@ -19,7 +19,7 @@ def logs_in(folder: Path) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("demo")
     # What an older simulator rendered, and what is none of the demo's business.
     (folder / "demo-street-short-stereo-60-0123456789ab.lcmlog").write_bytes(b"old")
@@ -28,11 +28,11 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def first(tessera, folder):
+def first(tessera: Tessera, folder: Path) -> Finished:
     return tessera.command("demo", "--frames", FRAMES, "--logs", folder, "--port", tessera.next_port()).must_end_well()
 
 
-def test_the_result_is_told(first, folder) -> None:
+def test_the_result_is_told(first: Finished, folder: Path) -> None:
     assert f"All {FRAMES} frames were tracked." in first.out and "(RMS)" in first.out
     named = {
         line.split(":")[0]: line.split()[1]
@@ -43,11 +43,11 @@ def test_the_result_is_told(first, folder) -> None:
     assert "<!DOCTYPE html>" in Path(named["report"]).read_text()
 
 
-def test_only_its_own_old_drives_go(first, folder) -> None:
+def test_only_its_own_old_drives_go(first: Finished, folder: Path) -> None:
     assert logs_in(folder) == sorted([log_name(FRAMES), "mine.lcmlog"])
 
 
-def test_a_second_call_uses_the_drive_again(tessera, first, folder) -> None:
+def test_a_second_call_uses_the_drive_again(tessera: Tessera, first: Finished, folder: Path) -> None:
     written_at = (folder / log_name(FRAMES)).stat().st_mtime_ns
     out = folder / "second"
     again = tessera.command(
@@ -59,7 +59,7 @@ def test_a_second_call_uses_the_drive_again(tessera, first, folder) -> None:
 
 
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_rendering_leaves_nothing(tessera, tmp_path, sign) -> None:
+def test_an_interrupted_rendering_leaves_nothing(tessera: Tessera, tmp_path: Path, sign: signal.Signals) -> None:
     demo = tessera.start("demo", "--logs", tmp_path, "--port", tessera.next_port())
     deadline = time.monotonic() + RUN_TIMEOUT_S
     while not any(path.stat().st_size > 0 for path in tmp_path.iterdir()):
@@ -71,7 +71,7 @@ def test_an_interrupted_rendering_leaves_nothing(tessera, tmp_path, sign) -> Non
     assert not list(tmp_path.iterdir())
 
 
-def test_the_default_is_the_whole_drive(tessera, tmp_path) -> None:
+def test_the_default_is_the_whole_drive(tessera: Tessera, tmp_path: Path) -> None:
     refused = tessera.command(
         "record",
         "sim:street-short",
@@ -82,6 +82,10 @@ def test_the_default_is_the_whole_drive(tessera, tmp_path) -> None:
         f"{DEMO_FRAMES}:{DEMO_FRAMES + 1}",
     )
     assert refused.status == 2 and f"has {DEMO_FRAMES} frames" in refused.err
+
+
+def test_the_sources_that_render_it_exist() -> None:
+    assert [name for name in RENDERED_BY if not (ROOT / name).is_dir()] == []
 
 
 def test_the_name_of_a_drive_says_what_it_is() -> None:
@@ -100,6 +104,6 @@ def test_the_name_of_a_drive_says_what_it_is() -> None:
         (["twice"], "twice"),
     ],
 )
-def test_arguments_at_fault(tessera, arguments, word) -> None:
+def test_arguments_at_fault(tessera: Tessera, arguments: list[Any], word: str) -> None:
     refused = tessera.command("demo", *arguments)
     assert refused.status == 2 and word in refused.err and refused.err.count("\n") == 1, refused.err

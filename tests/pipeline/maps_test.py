@@ -3,14 +3,15 @@
 import csv
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from conftest import NUM_FRAMES, ROOT
-from synthetic_sequence import HEIGHT_PX, WIDTH_PX
+from helpers.stack import NUM_FRAMES, ROOT, Finished, Tessera
+from helpers.synthetic_sequence import HEIGHT_PX, WIDTH_PX
 
 BLACK = f"P5 {WIDTH_PX} {HEIGHT_PX} 255\n".encode() + bytes(WIDTH_PX * HEIGHT_PX)
-# The lost camera is black for 2 s, long enough for a new part of the map to be begun if nothing were recognised.
+# The lost camera is black for 2 s, long enough for a new part of the map to be begun if nothing were recognized.
 NUM_BLACK = 40
 
 
@@ -31,13 +32,15 @@ def rearrange(sequence: Path, folder: Path, frames: list[int | None]) -> Path:
     return folder
 
 
-def states(run) -> list[str]:
+def states(run: Finished) -> list[str]:
     with open(run.folder / "frames.csv", newline="") as file:
         return [row["state"] for row in csv.DictReader(file)]
 
 
 @pytest.mark.parametrize("sensor", ["mono", "stereo"])
-def test_a_camera_that_saw_nothing_is_found_where_it_was_before(tessera, sequence, tmp_path, sensor) -> None:
+def test_a_camera_that_saw_nothing_is_found_where_it_was_before(
+    tessera: Tessera, sequence: Path, tmp_path: Path, sensor: str
+) -> None:
     frames = [*range(NUM_FRAMES), *[None] * NUM_BLACK, *range(20, 40)]
     blinded = rearrange(sequence, tmp_path / "blinded", frames)
     run = tessera.run(f"kitti:{blinded}", "--sensor", sensor).must_end_well()
@@ -49,7 +52,9 @@ def test_a_camera_that_saw_nothing_is_found_where_it_was_before(tessera, sequenc
     assert run.summary["rms_error_m"] < 0.05
 
 
-def test_a_camera_that_was_carried_back_goes_on_in_the_same_map(tessera, sequence, tmp_path) -> None:
+def test_a_camera_that_was_carried_back_continues_in_the_same_map(
+    tessera: Tessera, sequence: Path, tmp_path: Path
+) -> None:
     jumping = rearrange(sequence, tmp_path / "jumping", [*range(NUM_FRAMES), *range(5, 25)])
     run = tessera.run(f"kitti:{jumping}", "--sensor", "stereo").must_end_well()
     assert run.summary["frames_lost"] == 0
@@ -58,7 +63,7 @@ def test_a_camera_that_was_carried_back_goes_on_in_the_same_map(tessera, sequenc
 
 
 @pytest.fixture(scope="module")
-def saved(tessera, sequence, tmp_path_factory):
+def saved(tessera: Tessera, sequence: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Finished, Path]:
     """A run and the map that it saved."""
     path = tmp_path_factory.mktemp("maps") / "room.tessera"
     run = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--save-map", path).must_end_well()
@@ -66,7 +71,9 @@ def saved(tessera, sequence, tmp_path_factory):
     return run, path
 
 
-def test_a_saved_map_places_every_frame_of_another_run(tessera, sequence, saved) -> None:
+def test_a_saved_map_places_every_frame_of_another_run(
+    tessera: Tessera, sequence: Path, saved: tuple[Finished, Path]
+) -> None:
     run, path = saved
     localized = tessera.run(
         f"kitti:{sequence}", "--sensor", "stereo", "--load-map", path, "--localize-only"
@@ -76,7 +83,9 @@ def test_a_saved_map_places_every_frame_of_another_run(tessera, sequence, saved)
     assert localized.summary["rms_error_m"] < max(0.005, 1.2 * run.summary["rms_error_m"])
 
 
-def test_a_saved_map_is_continued_and_again_the_same_each_time(tessera, sequence, saved) -> None:
+def test_a_saved_map_is_continued_and_again_the_same_each_time(
+    tessera: Tessera, sequence: Path, saved: tuple[Finished, Path]
+) -> None:
     run, path = saved
     continued = [
         tessera.run(
@@ -90,7 +99,9 @@ def test_a_saved_map_is_continued_and_again_the_same_each_time(tessera, sequence
         assert continued[0].summary[key] == continued[1].summary[key]
 
 
-def test_a_broken_map_file_is_refused_in_one_sentence(tessera, sequence, saved, tmp_path) -> None:
+def test_a_broken_map_file_is_refused_in_one_sentence(
+    tessera: Tessera, sequence: Path, saved: tuple[Finished, Path], tmp_path: Path
+) -> None:
     _, path = saved
     whole = path.read_bytes()
     cut = tmp_path / "cut.tessera"
@@ -111,7 +122,7 @@ def test_a_broken_map_file_is_refused_in_one_sentence(tessera, sequence, saved, 
         (["--set", "tracker.localize_only=true"], "--localize-only"),
     ],
 )
-def test_wrong_arguments_about_maps(tessera, sequence, arguments, words) -> None:
+def test_wrong_arguments_about_maps(tessera: Tessera, sequence: Path, arguments: list[Any], words: str) -> None:
     finished = tessera.run(f"kitti:{sequence}", *arguments)
     assert finished.status == 2 and words in finished.err
 

@@ -1,20 +1,21 @@
-"""Two robots share four extractors: each has the trajectory and the map that it has alone, whatever the other does and whatever dies."""
+"""Two robots share four extractors: each has the same trajectory and map as alone, whatever else happens."""
 
 import json
 import os
 import signal
 import subprocess
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from helpers.stack import FIRST_PORT, NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera
 from tessera_cli import settings
 from tessera_cli.files import BIN
 from tessera_cli.supervision.progress import RUNNING
-from tessera_cli.supervision.stack_monitor import BusListener
-
-from conftest import FIRST_PORT, NUM_FRAMES, ROOT, RUN_TIMEOUT_S
+from tessera_cli.supervision.stack_monitor import StackMonitor
 
 DATA = Path(os.environ.get("TESSERA_DATA", ROOT.parent / "shared" / "data"))
 KITTI_03 = DATA / "kitti" / "sequences" / "03"
@@ -30,10 +31,12 @@ class Processes:
     def __init__(self, folder: Path, assignments: list[str]) -> None:
         folder.mkdir()
         self.folder = folder
-        values = settings.write_settings(settings.port_assignments(PORT) + assignments, folder / "settings.yaml")
+        values = settings.write_settings(
+            settings.network_assignments(PORT, on_lan=False) + assignments, folder / "settings.yaml"
+        )
         self._running: dict[str, subprocess.Popen] = {}
         pids = self._running
-        self._bus = BusListener(
+        self._bus = StackMonitor(
             values["bus"]["main_url"],
             values["bus"]["channel_prefix"],
             lambda pid: any(process.pid == pid for process in pids.values()),
@@ -63,11 +66,11 @@ class Processes:
             lambda: all(name in stages and stages[name].state >= RUNNING for name in self._running), "the stages"
         )
 
-    def listen_until(self, condition, what: str) -> None:
+    def listen_until(self, condition: Callable[[], object], what: str) -> None:
         deadline = time.monotonic() + RUN_TIMEOUT_S
         while not condition():
             assert time.monotonic() < deadline, f"waited in vain for {what} in {self.folder}"
-            self._bus.listen(20)
+            self._bus.listen(0.02)
 
     @property
     def num_poses(self) -> int:
@@ -76,7 +79,7 @@ class Processes:
     @property
     def values(self) -> dict[str, dict[str, float]]:
         """What each stage counts besides."""
-        self._bus.listen(1)
+        self._bus.listen(0.001)
         return {name: report.values for name, report in self._bus.progress.stages.items()}
 
     def kill(self, *names: str) -> None:
@@ -125,7 +128,7 @@ class Pool(Processes):
 
 
 @pytest.fixture(scope="module")
-def tasks(sequence) -> dict[str, list[str]]:
+def tasks(sequence: Path) -> dict[str, list[str]]:
     """What the two robots do: one image cut into small tiles, and whole stereo images."""
     if KITTI_03.is_dir():
         source = [f"camera.source=kitti:{KITTI_03}", f"camera.last_frame={NUM_KITTI_FRAMES}"]
@@ -135,7 +138,7 @@ def tasks(sequence) -> dict[str, list[str]]:
 
 
 @pytest.fixture(scope="module")
-def alone(tasks, tmp_path_factory) -> dict[str, dict]:
+def alone(tasks: dict[str, list[str]], tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict]:
     """What each robot comes to with one extractor of its own."""
     folder = tmp_path_factory.mktemp("alone")
     return {
@@ -144,54 +147,77 @@ def alone(tasks, tmp_path_factory) -> dict[str, dict]:
     }
 
 
+class Starter:
+    """Starts pools and robots."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._started: list[Processes] = []
+
+    def pool(self) -> Pool:
+        pool = Pool(self._folder / "pool")
+        self._started.append(pool)
+        return pool
+
+    def robot(self, name: str, prefix: str, *task: str) -> Robot:
+        robot = Robot(self._folder / name, prefix, *task)
+        self._started.append(robot)
+        return robot
+
+    def kill_all(self) -> None:
+        for processes in self._started:
+            processes.kill()
+
+
 @pytest.fixture
-def start(tmp_path):
-    """Starts a pool or a robot; all of them are gone after the test."""
-    started = []
-
-    def begin(make, name: str, *arguments):
-        started.append(make(tmp_path / name, *arguments))
-        return started[-1]
-
-    yield begin
-    for processes in started:
-        processes.kill()
+def start(tmp_path: Path) -> Iterator[Starter]:
+    starter = Starter(tmp_path)
+    yield starter
+    starter.kill_all()
 
 
-def test_two_robots_share_four_extractors(start, tasks, alone) -> None:
-    pool = start(Pool, "pool")
-    robots = {prefix: start(Robot, prefix, prefix, *task).start_all() for prefix, task in tasks.items()}
+def test_two_robots_share_four_extractors(
+    start: Starter, tasks: dict[str, list[str]], alone: dict[str, dict[str, Any]]
+) -> None:
+    pool = start.pool()
+    robots = {prefix: start.robot(prefix, prefix, *task).start_all() for prefix, task in tasks.items()}
     assert {prefix: robot.result() for prefix, robot in robots.items()} == alone
     for values in pool.values.values():
         assert values["work_a_"] > 0 and values["work_b_"] > 0
 
 
-def test_a_shared_extractor_that_is_killed_changes_nothing(start, tasks, alone) -> None:
-    pool = start(Pool, "pool")
-    robots = {prefix: start(Robot, prefix, prefix, *task).start_all() for prefix, task in tasks.items()}
+def test_a_shared_extractor_that_is_killed_changes_nothing(
+    start: Starter, tasks: dict[str, list[str]], alone: dict[str, dict[str, Any]]
+) -> None:
+    pool = start.pool()
+    robots = {prefix: start.robot(prefix, prefix, *task).start_all() for prefix, task in tasks.items()}
     robots["a_"].listen_until(lambda: robots["a_"].num_poses > NUM_FRAMES // 4, "poses")
     pool.kill("extractor_1", "extractor_3")
     pool.start("extractor", 3)
     assert {prefix: robot.result() for prefix, robot in robots.items()} == alone
 
 
-def test_robots_come_and_go_and_come_again(start, tasks, alone) -> None:
-    start(Pool, "pool")
-    a = start(Robot, "a", "a_", *tasks["a_"]).start_all()
+def test_robots_come_and_go_and_come_again(
+    start: Starter, tasks: dict[str, list[str]], alone: dict[str, dict[str, Any]]
+) -> None:
+    start.pool()
+    a = start.robot("a", "a_", *tasks["a_"]).start_all()
     a.listen_until(lambda: a.num_poses > NUM_FRAMES // 4, "poses")
-    b = start(Robot, "b, killed", "b_", *tasks["b_"]).start_all()
+    b = start.robot("b, killed", "b_", *tasks["b_"]).start_all()
     b.listen_until(lambda: b.num_poses > NUM_FRAMES // 4, "poses")
     b.kill()
     time.sleep(1.0)  # who was killed counts as there for so long
-    again = start(Robot, "b, again", "b_", *tasks["b_"]).start_all()
+    again = start.robot("b, again", "b_", *tasks["b_"]).start_all()
     assert a.result() == alone["a_"]
     assert again.result() == alone["b_"]
-    once_more = start(Robot, "a, once more", "a_", *tasks["a_"]).start_all()
+    once_more = start.robot("a, once more", "a_", *tasks["a_"]).start_all()
     assert once_more.result() == alone["a_"]
 
 
-def test_tessera_run_takes_the_extractors_of_a_pool(start, tessera, sequence, reference_run) -> None:
-    start(Pool, "pool")
+def test_tessera_run_takes_the_extractors_of_a_pool(
+    start: Starter, tessera: Tessera, sequence: Path, reference_run: Finished
+) -> None:
+    start.pool()
     out = tessera.next_folder().with_name("with a pool")
     tessera.command(
         "run", f"kitti:{sequence}", "--extractors", 0, "--prefix", "a_", "--port", PORT, "--out", out

@@ -13,7 +13,7 @@ from pathlib import Path
 import lcm
 import pytest
 
-from conftest import NUM_FRAMES, ROOT, RUN_TIMEOUT_S
+from helpers.stack import NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera, read_line, wait_for
 
 # All poses of the made sequence are known exactly; the room is 14 m wide.
 MAX_RMS_ERROR_M = 0.05
@@ -49,17 +49,10 @@ SUMMARY_KEYS = {
 LOGPLAYER = ROOT / ".venv" / "bin" / "lcm-logplayer"
 
 
-def must_equal(finished, reference) -> None:
+def must_equal(finished: Finished, reference: Finished) -> None:
     finished.must_end_well()
     for key in ("frames", "frames_tracked", "frames_dropped", "trajectory_sha256", "map_sha256"):
         assert finished.summary[key] == reference.summary[key], key
-
-
-def wait_for(condition, what: str, timeout_s: float = RUN_TIMEOUT_S) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, f"waited in vain for {what}"
-        time.sleep(0.02)
 
 
 def pids_of(folder: Path, stage: str = "") -> list[int]:
@@ -77,7 +70,7 @@ def pids_of(folder: Path, stage: str = "") -> list[int]:
     return found
 
 
-def test_a_run_ends_well(reference_run) -> None:
+def test_a_run_ends_well(reference_run: Finished) -> None:
     summary = reference_run.summary
     assert set(summary) >= SUMMARY_KEYS
     assert summary["frames"] == NUM_FRAMES
@@ -93,7 +86,7 @@ def test_a_run_ends_well(reference_run) -> None:
         assert summary["cpu_s"][name] > 0 and summary["max_rss_mb"][name] > 0
 
 
-def test_a_run_leaves_its_files(reference_run) -> None:
+def test_a_run_leaves_its_files(reference_run: Finished) -> None:
     files = {path.name for path in reference_run.folder.iterdir()}
     assert files >= {
         "trajectory.txt",
@@ -114,16 +107,16 @@ def test_a_run_leaves_its_files(reference_run) -> None:
     ).read_text()
 
 
-def test_evaluate_repeats_the_error_of_the_run(tessera, reference_run) -> None:
+def test_evaluate_repeats_the_error_of_the_run(tessera: Tessera, reference_run: Finished) -> None:
     finished = tessera.command("evaluate", reference_run.folder).must_end_well()
     assert f"{reference_run.summary['rms_error_m']:.4f} m" in finished.out
 
 
-def test_cut_and_shared_out_gives_the_same(tessera, sequence, reference_run) -> None:
+def test_cut_and_shared_out_gives_the_same(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
     must_equal(tessera.run(f"kitti:{sequence}", "--extractors", 3, "--tiles", "2x4"), reference_run)
 
 
-def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, reference_run) -> None:
+def test_an_extractor_that_is_killed_changes_nothing(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start(
         "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
@@ -142,7 +135,9 @@ def test_an_extractor_that_is_killed_changes_nothing(tessera, sequence, referenc
 
 
 @pytest.mark.parametrize("stage", ["camera", "dispatcher", "reassembler", "mapper", "evaluator"])
-def test_a_stage_that_is_killed_changes_nothing(tessera, sequence, reference_run, stage) -> None:
+def test_a_stage_that_is_killed_changes_nothing(
+    tessera: Tessera, sequence: Path, reference_run: Finished, stage: str
+) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start(
         "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
@@ -161,7 +156,7 @@ def test_a_stage_that_is_killed_changes_nothing(tessera, sequence, reference_run
         assert summary[key] == reference_run.summary[key], key
 
 
-def test_a_tracker_that_is_killed_ends_the_run(tessera, sequence) -> None:
+def test_a_tracker_that_is_killed_ends_the_run(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -172,7 +167,7 @@ def test_a_tracker_that_is_killed_ends_the_run(tessera, sequence) -> None:
     assert not pids_of(folder)
 
 
-def test_a_mapper_of_lowest_priority_changes_nothing(tessera, sequence, reference_run) -> None:
+def test_a_mapper_of_lowest_priority_changes_nothing(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--extractors", 2, "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "mapper"), "the mapper")
@@ -184,7 +179,9 @@ def test_a_mapper_of_lowest_priority_changes_nothing(tessera, sequence, referenc
         assert summary[key] == reference_run.summary[key], key
 
 
-def test_the_map_of_a_running_stack_is_the_mappers(tessera, sequence, reference_run, tmp_path) -> None:
+def test_the_map_of_a_running_stack_is_the_mappers(
+    tessera: Tessera, sequence: Path, reference_run: Finished, tmp_path: Path
+) -> None:
     """A listener that joins in the middle reaches the hash of the owner, and says it."""
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.2", "--port", port, "--out", folder)
@@ -206,13 +203,13 @@ def test_the_map_of_a_running_stack_is_the_mappers(tessera, sequence, reference_
     assert (tmp_path / "whole.ply").read_text() == (folder / "map.ply").read_text()
 
 
-def test_map_without_a_stack_is_refused(tessera, tmp_path) -> None:
+def test_map_without_a_stack_is_refused(tessera: Tessera, tmp_path: Path) -> None:
     finished = tessera.command("map", tmp_path / "none.ply", "--port", tessera.next_port())
     assert finished.status == 2, finished.out + finished.err
     assert "--port" in finished.err and finished.err.count("\n") == 1
 
 
-def test_a_live_run_is_replayed_as_it_went(tessera, sequence) -> None:
+def test_a_live_run_is_replayed_as_it_went(tessera: Tessera, sequence: Path) -> None:
     """Nobody waits for the mapper, and frames drop: what came of that depends on the machine, but can be repeated."""
     settings = ("--set", "dispatcher.max_queued_frames=1", "--set", "dispatcher.max_frames_in_flight=1")
     live = tessera.run(f"kitti:{sequence}", "--live", "--record", "--pace", "3", *settings).must_end_well()
@@ -225,7 +222,7 @@ def test_a_live_run_is_replayed_as_it_went(tessera, sequence) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_writes_what_it_has(tessera, sequence, number) -> None:
+def test_an_interrupted_run_writes_what_it_has(tessera: Tessera, sequence: Path, number: signal.Signals) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.5", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -237,7 +234,7 @@ def test_an_interrupted_run_writes_what_it_has(tessera, sequence, number) -> Non
     assert not pids_of(folder)
 
 
-def test_no_stage_outlives_a_killed_launcher(tessera, sequence) -> None:
+def test_no_stage_outlives_a_killed_launcher(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -246,7 +243,7 @@ def test_no_stage_outlives_a_killed_launcher(tessera, sequence) -> None:
     wait_for(lambda: not pids_of(folder), "the end of all stages", timeout_s=10)
 
 
-def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence) -> None:
+def test_a_second_stack_on_the_same_port_is_refused(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     first = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -260,7 +257,7 @@ def test_a_second_stack_on_the_same_port_is_refused(tessera, sequence) -> None:
     assert "--port" in second.err
 
 
-def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tessera, sequence) -> None:
+def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     first = tessera.start("run", f"kitti:{sequence}", "--port", port, "--out", folder)
     wait_for(lambda: pids_of(folder, "camera"), "the camera")
@@ -271,7 +268,7 @@ def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tess
 
 
 @pytest.fixture(scope="module")
-def log(tessera, sequence, tmp_path_factory) -> Path:
+def log(tessera: Tessera, sequence: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     log = tmp_path_factory.mktemp("logs") / "room 1.lcmlog"
     finished = tessera.command("record", f"kitti:{sequence}", log).must_end_well()
     assert f"{NUM_FRAMES} frames" in finished.out
@@ -279,16 +276,16 @@ def log(tessera, sequence, tmp_path_factory) -> Path:
     return log
 
 
-def test_a_recorded_log_is_replayed_to_the_same(tessera, log, reference_run) -> None:
+def test_a_recorded_log_is_replayed_to_the_same(tessera: Tessera, log: Path, reference_run: Finished) -> None:
     must_equal(tessera.run(log, "--extractors", 2, command="replay"), reference_run)
 
 
-def test_stock_lcm_logplayer_feeds_the_stack(tessera, log, reference_run) -> None:
+def test_stock_lcm_logplayer_feeds_the_stack(tessera: Tessera, log: Path, reference_run: Finished) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", "bus:", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder)
     line = ""
     while "waiting for frames" not in line:
-        line = run.stdout.readline()
+        line = read_line(run)
         assert line, "the stack ended before it was ready"
     subprocess.run(
         [LOGPLAYER, f"--lcm-url=udpm://239.255.76.67:{port}?ttl=0", log],
@@ -303,7 +300,7 @@ def test_stock_lcm_logplayer_feeds_the_stack(tessera, log, reference_run) -> Non
     assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
 
 
-def test_a_log_cut_in_the_middle_is_refused(tessera, log, tmp_path) -> None:
+def test_a_log_cut_in_the_middle_is_refused(tessera: Tessera, log: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.lcmlog"
     cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     finished = tessera.run(cut, command="replay")
@@ -344,7 +341,9 @@ def publish_noise(port: int, generator: random.Random) -> None:
         time.sleep(0.005)
 
 
-def test_random_bytes_on_every_channel_are_counted_and_change_nothing(tessera, sequence, reference_run) -> None:
+def test_random_bytes_on_every_channel_are_counted_and_change_nothing(
+    tessera: Tessera, sequence: Path, reference_run: Finished
+) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start(
         "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
@@ -358,14 +357,14 @@ def test_random_bytes_on_every_channel_are_counted_and_change_nothing(tessera, s
     assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
 
 
-def test_stereo_is_the_same_for_every_cut(tessera, sequence) -> None:
+def test_stereo_is_the_same_for_every_cut(tessera: Tessera, sequence: Path) -> None:
     whole = tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--extractors", 1).must_end_well()
     assert whole.summary["frames_tracked"] == NUM_FRAMES
     assert whole.summary["rms_error_m"] < MAX_RMS_ERROR_M
     must_equal(tessera.run(f"kitti:{sequence}", "--sensor", "stereo", "--extractors", 2, "--tiles", "2x2"), whole)
 
 
-def test_frames_choose_a_part(tessera, sequence) -> None:
+def test_frames_choose_a_part(tessera: Tessera, sequence: Path) -> None:
     finished = tessera.run(f"kitti:{sequence}", "--frames", "0:20").must_end_well()
     assert finished.summary["frames"] == 20
 
@@ -374,31 +373,31 @@ class TestDamagedInput:
     """Each is one sentence and exit status 2."""
 
     @pytest.fixture
-    def damaged(self, sequence, tmp_path) -> Path:
+    def damaged(self, sequence: Path, tmp_path: Path) -> Path:
         return Path(shutil.copytree(sequence, tmp_path / "damaged"))
 
-    def must_be_refused(self, tessera, folder: Path, word: str) -> None:
+    def must_be_refused(self, tessera: Tessera, folder: Path, word: str) -> None:
         finished = tessera.run(f"kitti:{folder}")
         assert finished.status == 2, finished.out + finished.err
         assert word in finished.err and finished.err.count("\n") == 1, finished.err
 
-    def test_no_calibration(self, tessera, damaged) -> None:
+    def test_no_calibration(self, tessera: Tessera, damaged: Path) -> None:
         (damaged / "calib.txt").unlink()
         self.must_be_refused(tessera, damaged, "calib.txt")
 
-    def test_malformed_calibration(self, tessera, damaged) -> None:
+    def test_malformed_calibration(self, tessera: Tessera, damaged: Path) -> None:
         (damaged / "calib.txt").write_text("P0: 300 zero\n")
         self.must_be_refused(tessera, damaged, "calib.txt")
 
-    def test_too_few_times(self, tessera, damaged) -> None:
+    def test_too_few_times(self, tessera: Tessera, damaged: Path) -> None:
         (damaged / "times.txt").write_text("0.0\n0.1\n")
         self.must_be_refused(tessera, damaged, "times.txt")
 
-    def test_truncated_image(self, tessera, damaged) -> None:
+    def test_truncated_image(self, tessera: Tessera, damaged: Path) -> None:
         image = damaged / "image_0" / "000030.pgm"
         image.write_bytes(image.read_bytes()[:1000])
         self.must_be_refused(tessera, damaged, "000030.pgm")
 
-    def test_image_of_another_size(self, tessera, damaged) -> None:
+    def test_image_of_another_size(self, tessera: Tessera, damaged: Path) -> None:
         (damaged / "image_0" / "000030.pgm").write_bytes(b"P5 10 10 255\n" + bytes(100))
         self.must_be_refused(tessera, damaged, "000030.pgm")

@@ -1,42 +1,32 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "place_recognition/vocabulary.h"
 #include "place_recognition/vocabulary_training.h"
 #include "support/planted_descriptors.h"
+#include "support/temporary_folder.h"
 
 namespace tessera {
 namespace {
 
-namespace fs = std::filesystem;
-
-std::string ReadText(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 class VocabularyFileTest : public testing::Test {
  protected:
   VocabularyFileTest() {
-    fs::create_directories(folder_);
     VocabularyTree tree = TrainVocabulary({RandomDescriptors(12, 1), RandomDescriptors(9, 2)},
                                           {.num_children = 3, .num_levels = 2, .direct_level = 1});
     tree.origin = "two images that nobody took";
     tree_ = tree;
     Vocabulary(tree).Save(path_);
   }
-  ~VocabularyFileTest() override { fs::remove_all(folder_); }
 
   // The sentence with which a file of this text is refused; empty if it isn't.
   std::string Refusal(const std::string& text) const {
-    fs::remove(path_);  // overwriting would wait for the disk, each time
-    std::ofstream(path_, std::ios::binary) << text;
+    std::filesystem::remove(path_);  // overwriting would wait for the disk, each time
+    folder_.Write("vocabulary.tvoc", text);
     try {
       Vocabulary::Load(path_);
     } catch (const InputError& error) {
@@ -45,24 +35,24 @@ class VocabularyFileTest : public testing::Test {
     return "";
   }
 
-  const fs::path folder_ = fs::temp_directory_path() / ("tessera_vocabulary_test_" + std::to_string(getpid()));
-  const std::string path_ = folder_ / "vocabulary.tvoc";
+  const TemporaryFolder folder_;
+  const std::string path_ = folder_.path("vocabulary.tvoc");
   VocabularyTree tree_;
 };
 
 TEST_F(VocabularyFileTest, LoadsWhatWasSaved) {
   EXPECT_EQ(Vocabulary::Load(path_)->tree(), tree_);
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);  // nothing is left beside
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1);  // nothing is left beside
 }
 
 TEST_F(VocabularyFileTest, SavesTheSameBytesAgain) {
-  const std::string text = ReadText(path_);
+  const std::string text = ReadFile(path_);
   Vocabulary::Load(path_)->Save(path_);
-  EXPECT_EQ(ReadText(path_), text);
+  EXPECT_EQ(ReadFile(path_), text);
 }
 
 TEST_F(VocabularyFileTest, RefusesEveryCut) {
-  const std::string text = ReadText(path_);
+  const std::string text = ReadFile(path_);
   for (size_t length = 0; length < text.size(); ++length) {
     const std::string refusal = Refusal(text.substr(0, length));
     EXPECT_NE(refusal.find("truncated"), std::string::npos) << "cut at " << length << ": " << refusal;
@@ -72,7 +62,7 @@ TEST_F(VocabularyFileTest, RefusesEveryCut) {
 }
 
 TEST_F(VocabularyFileTest, RefusesEveryFlippedByte) {
-  const std::string text = ReadText(path_);
+  const std::string text = ReadFile(path_);
   for (size_t i = 0; i < text.size(); ++i) {
     std::string flipped = text;
     flipped[i] = static_cast<char>(flipped[i] ^ 0x55);
@@ -81,11 +71,11 @@ TEST_F(VocabularyFileTest, RefusesEveryFlippedByte) {
 }
 
 TEST_F(VocabularyFileTest, RefusesWhatIsAppended) {
-  EXPECT_NE(Refusal(ReadText(path_) + "x").find("damaged"), std::string::npos);
+  EXPECT_NE(Refusal(ReadFile(path_) + "x").find("damaged"), std::string::npos);
 }
 
 TEST_F(VocabularyFileTest, RefusesAnotherVersionByItsNumber) {
-  std::string text = ReadText(path_);
+  std::string text = ReadFile(path_);
   text[std::string("tessera vocabulary\n").size()] = 7;
   const std::string refusal = Refusal(text);
   EXPECT_NE(refusal.find("is of version 7"), std::string::npos) << refusal;
@@ -95,12 +85,12 @@ TEST_F(VocabularyFileTest, RefusesWhatIsNoVocabulary) {
   EXPECT_NE(Refusal("%YAML 1.2\nthis: is a text of some other kind, long enough to hold a header\n")
                 .find("is not a vocabulary"),
             std::string::npos);
-  EXPECT_THROW(Vocabulary::Load(folder_ / "missing.tvoc"), InputError);
-  EXPECT_THROW(Vocabulary::Load(folder_), InputError);
+  EXPECT_THROW(Vocabulary::Load(folder_.path("missing.tvoc")), InputError);
+  EXPECT_THROW(Vocabulary::Load(folder_.path()), InputError);
 }
 
 TEST_F(VocabularyFileTest, SaysWhenItCantBeWritten) {
-  EXPECT_THROW(Vocabulary(tree_).Save(folder_ / "no_such_folder" / "vocabulary.tvoc"), InputError);
+  EXPECT_THROW(Vocabulary(tree_).Save(folder_.path("no_such_folder/vocabulary.tvoc")), InputError);
 }
 
 }  // namespace

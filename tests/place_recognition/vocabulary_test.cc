@@ -124,11 +124,11 @@ TEST(Vocabulary, OfEquallyNearChildrenTheFirstIsTaken) {
 
 TEST(Vocabulary, RefusesWhatIsNoTree) {
   const VocabularyTree good{.num_children = {2, 0, 0}, .centers = {{}, {1}, {2}}, .idf = {1.0F, 1.0F}};
-  EXPECT_EQ(good.Check(), "");
+  EXPECT_TRUE(good.Check());
   const auto refuses = [&](const auto& spoil) {
     VocabularyTree bad = good;
     spoil(bad);
-    EXPECT_NE(bad.Check(), "");
+    EXPECT_FALSE(bad.Check());
     EXPECT_THROW(Vocabulary{bad}, std::invalid_argument);
   };
   refuses([](VocabularyTree& tree) { tree = {}; });

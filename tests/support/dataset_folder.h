@@ -1,11 +1,9 @@
-// A folder in the temporary directory in which a test writes a small data set; removed with the object.
+// A temporary folder in which a test writes a small data set.
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -14,31 +12,12 @@
 
 #include "core/errors.h"
 #include "core/image.h"
+#include "support/temporary_folder.h"
 
 namespace tessera {
 
-class DatasetFolder {
+class DatasetFolder : public TemporaryFolder {
  public:
-  DatasetFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "tessera-datasets-XXXXXX").string();
-    path_ = mkdtemp(pattern.data());
-  }
-  ~DatasetFolder() { std::filesystem::remove_all(path_); }
-  DatasetFolder(const DatasetFolder&) = delete;
-  DatasetFolder& operator=(const DatasetFolder&) = delete;
-
-  std::string path(const std::string& name = "") const { return name.empty() ? path_ : path_ + "/" + name; }
-
-  void Write(const std::string& name, const std::string& text) const {
-    std::filesystem::create_directories(std::filesystem::path(path(name)).parent_path());
-    std::ofstream(path(name), std::ios::binary) << text;
-  }
-  std::string Read(const std::string& name) const {
-    std::ifstream file(path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
-  void Truncate(const std::string& name, size_t num_bytes) const { Write(name, Read(name).substr(0, num_bytes)); }
-
   // A gray image whose pixels tell where they are and which image it is.
   static cv::Mat Pattern(int width, int height, int seed) {
     cv::Mat image(height, width, CV_8U);
@@ -53,9 +32,6 @@ class DatasetFolder {
     std::filesystem::create_directories(std::filesystem::path(path(name)).parent_path());
     ASSERT_TRUE(cv::imwrite(path(name), image));
   }
-
- private:
-  std::string path_;
 };
 
 inline GrayImage ToGray(const cv::Mat& mat) {

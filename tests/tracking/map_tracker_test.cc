@@ -5,7 +5,7 @@
 #include "mapping/mapper.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
-#include "tracking/delta_schedule.h"
+#include "tracking/tracker_time.h"
 
 namespace tessera {
 namespace {
@@ -21,17 +21,17 @@ struct Outcome {
 void Follow(SyntheticWorld world, int64_t num_frames, int64_t delay_frames, const std::vector<int64_t>& dropped,
             Outcome& outcome) {
   MapTracker tracker{MapTrackerOptions{}};
-  DeltaSchedule schedule(delay_frames);
+  LogicalTime time(delay_frames);
   for (int64_t step = 0; step < num_frames; ++step) {
     const FeatureFrame features = world.Take(step).features;
     if (std::find(dropped.begin(), dropped.end(), step) != dropped.end()) continue;
-    ASSERT_TRUE(schedule.CanTrack(features.frame));
-    for (const auto& delta : schedule.Take(features.frame)) ASSERT_THAT(tracker.ApplyDelta(*delta), IsSuccess());
+    ASSERT_TRUE(time.HasDeltas(features.frame));
+    for (const auto& delta : time.TakeDeltas(features.frame)) ASSERT_THAT(tracker.ApplyDelta(*delta), IsSuccess());
     const MapTrackingResult result = tracker.Track(features);
     outcome.poses.push_back(result.pose);
     for (const KeyframeObservation& keyframe : result.keyframes) {
-      schedule.KeyframeSent(keyframe.id, features.frame);
-      schedule.Receive(std::make_shared<const MapDelta>(outcome.mapper.Process(keyframe)));
+      time.KeyframeSent(keyframe.id, features.frame);
+      time.Receive(std::make_shared<const MapDelta>(outcome.mapper.Process(keyframe)));
       ++outcome.num_keyframes;
     }
   }

@@ -1,6 +1,5 @@
 #include "stages/evaluator/evaluator_stage.h"
 
-#include <algorithm>
 #include <exception>
 #include <filesystem>
 
@@ -13,12 +12,6 @@
 namespace tessera {
 namespace {
 
-// Each stage speaks twice a second; the figures of a run are those that it gives after the end.
-constexpr int64_t kMaxWaitForStatusUs = 1'000'000;
-// After the tracker's end, a pose or a change of the map that has not come for this long won't come any more; a global
-// bundle adjustment of a large map takes a minute on a busy machine.
-constexpr int64_t kLastNewsTimeoutUs = 120'000'000;
-
 StageFigures FiguresOf(const StageStatus& status) {
   const StepStatistics& step = status.step;
   return {.step_ms = {step.count, step.mean_ms, step.median_ms, step.p95_ms, step.p99_ms, step.max_ms},
@@ -28,42 +21,55 @@ StageFigures FiguresOf(const StageStatus& status) {
           .values = {status.values.begin(), status.values.end()}};
 }
 
+// Makes the folder, so that a wrong path is found before the run.
+std::string OutDirFrom(const Settings& settings) {
+  auto out_dir = settings.Get<std::string>("evaluator.out_dir");
+  std::error_code error;
+  if (!out_dir.empty()) std::filesystem::create_directories(out_dir, error);
+  if (!error) return out_dir;
+  throw InputError("evaluator.out_dir " + out_dir + " can't be made: " + error.message() + "; choose another folder");
+}
+
 }  // namespace
 
 EvaluatorStage::EvaluatorStage(StageContext& context)
     : context_(context),
-      out_dir_(context.settings().Get<std::string>("evaluator.out_dir")),
-      map_(context, !context.settings().Get<std::string>("mapper.load_map").empty(), [this] { OnDeltas(); }) {
-  if (!out_dir_.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(out_dir_, error);
-    if (error) {
-      throw InputError("evaluator.out_dir " + out_dir_ + " can't be made: " + error.message() +
-                       "; choose another folder");
-    }
-  }
+      out_dir_(OutDirFrom(context.settings())),
+      end_(context.name()),
+      map_(
+          context, !context.settings().Get<std::string>("mapper.load_map").empty(),
+          [this](const MapFollower::Delta& delta) { return Apply(*delta); },
+          [this] {
+            end_.NoteMap(map_.needs_snapshot() ? -1 : record_.map().next_delta(), context_.now_us());
+            FinishIfDone();
+          }) {
   context.Subscribe(kPose, [this](const PoseEstimate& pose, const MessageInfo& info) {
     record_.AddPose(pose, info.publish_us);
-    last_pose_ = std::max(last_pose_, pose.frame);
-    last_news_us_ = context_.now_us();
+    end_.NotePose(pose.frame, context_.now_us());
     FinishIfDone();
   });
   // One that was started again begins with a snapshot of the map, which does not hold all that poses are relative to.
   context.Subscribe(kRemovedKeyframes, [this](const RemovedInDelta& removed) {
     record_.AddRemoved(removed);
-    num_removals_known_ = std::max(num_removals_known_, removed.delta + 1);
+    end_.NoteRemoved(removed.delta);
     FinishIfDone();
   });
   context.Subscribe(kGroundTruth, [this](const GroundTruthPose& truth) { record_.AddGroundTruth(truth); });
-  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) { OnEnd(end); });
-  context.Subscribe(kStatus, [this](const StageStatus& status) { OnStatus(status); });
+  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
+    const bool is_new = end_.NoteEnd(end, context_.now_us());
+    if (is_new && end.stage == StageKind::kTracker) record_.SetEnd(end.num_frames, end.num_dropped);
+    map_.Receive(end);
+    FinishIfDone();
+  });
+  context.Subscribe(kStatus, [this](const StageStatus& status) {
+    record_.SetStage(status.name, FiguresOf(status));
+    end_.NoteStatus(status.name, context_.now_us());
+  });
   context.Every(std::chrono::milliseconds(50), [this] { FinishIfDone(); });
 }
 
 EvaluatorStage::~EvaluatorStage() {
-  if (record_.empty() && !end_) {
-    return;  // the run never began
-  }
+  if (record_.empty() && !end_.has_tracker_ended()) return;  // the run never began
   try {
     Write();
   } catch (const std::exception& error) {
@@ -71,79 +77,25 @@ EvaluatorStage::~EvaluatorStage() {
   }
 }
 
-void EvaluatorStage::OnStatus(const StageStatus& status) {
-  record_.SetStage(status.name, FiguresOf(status));
-  heard_us_[status.name] = context_.now_us();
-}
-
-void EvaluatorStage::OnEnd(const EndOfStream& end) {
-  if (end.stage == StageKind::kTracker && !end_) {
-    end_ = end;
-    record_.SetEnd(end.num_frames, end.num_dropped);
-  } else if (end.stage == StageKind::kMapper && !mapper_end_) {
-    mapper_end_ = end;
-    map_.Expect(end.num_values);
-  } else {
-    return;
-  }
-  last_news_us_ = context_.now_us();
-  FinishIfDone();
-}
-
-void EvaluatorStage::OnDeltas() {
-  for (const auto& delta : map_.Take()) {
-    if (const Result<> applied = record_.ApplyDelta(*delta); !applied) {
-      map_.Reject(applied.error().sentence);
-      break;
-    }
-  }
-  last_news_us_ = context_.now_us();
-  FinishIfDone();
-}
-
-// All poses and the whole map, or what came of them.
-bool EvaluatorStage::HasAll() const {
-  const bool has_poses = end_ && last_pose_.value + 1 >= end_->num_frames;
-  const bool has_map = mapper_end_ && !map_.needs_snapshot() && record_.map().next_delta() >= mapper_end_->num_values &&
-                       num_removals_known_ >= mapper_end_->num_values;
-  return (has_poses && has_map) || (end_ && context_.now_us() - last_news_us_ > kLastNewsTimeoutUs);
-}
-
-// Every stage that was alive lately has given its figures since the run was complete.
-bool EvaluatorStage::HaveAllReported() const {
-  return std::all_of(heard_us_.begin(), heard_us_.end(), [&](const auto& heard) {
-    return heard.first == context_.name() || heard.second > *complete_us_ ||
-           heard.second < *complete_us_ - kMaxWaitForStatusUs;
-  });
+Result<> EvaluatorStage::Apply(const MapDelta& delta) {
+  TESSERA_RETURN_IF_FAILED(record_.ApplyDelta(delta));
+  return {};
 }
 
 void EvaluatorStage::FinishIfDone() {
-  if (is_written_ || !HasAll()) {
-    return;
-  }
-  if (!complete_us_) {
-    complete_us_ = context_.now_us();
-  }
-  if (!HaveAllReported() && context_.now_us() - *complete_us_ < kMaxWaitForStatusUs) {
-    return;
-  }
+  if (is_written_ || !end_.IsReached(context_.now_us())) return;
   try {
     Write();
   } catch (const InputError& error) {
-    context_.Fail(error.what(), 2);
-    return;
+    return context_.Fail(error.what(), 2);
   }
   context_.Finish();
 }
 
 void EvaluatorStage::Write() {
-  if (is_written_) {
-    return;
-  }
+  if (is_written_) return;
   is_written_ = true;  // also when it fails: trying again would fail again
-  if (out_dir_.empty()) {
-    return;
-  }
+  if (out_dir_.empty()) return;
   WriteMapFile(record_.map(), out_dir_ + "/map.tessera");
   if (const auto path = context_.settings().Get<std::string>("evaluator.save_map"); !path.empty()) {
     WriteMapFile(record_.map(), path);

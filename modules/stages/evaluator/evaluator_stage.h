@@ -1,12 +1,10 @@
 // Wiring of the evaluator: what the stages say goes into a RunRecord, which is written once the run has
-// ended.
+// ended (evaluation/run_end.h).
 #pragma once
 
-#include <cstdint>
-#include <map>
-#include <optional>
 #include <string>
 
+#include "evaluation/run_end.h"
 #include "evaluation/run_record.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
@@ -23,25 +21,15 @@ class EvaluatorStage {
   EvaluatorStage& operator=(const EvaluatorStage&) = delete;
 
  private:
-  void OnStatus(const StageStatus& status);
-  void OnEnd(const EndOfStream& end);
-  void OnDeltas();
-  bool HasAll() const;
-  bool HaveAllReported() const;
+  Result<> Apply(const MapDelta& delta);
   void FinishIfDone();
   void Write();
 
   StageContext& context_;
   std::string out_dir_;
   RunRecord record_;
+  RunEnd end_;
   MapSubscription map_;
-  std::optional<EndOfStream> end_;  // the tracker's
-  std::optional<EndOfStream> mapper_end_;
-  FrameId last_pose_;
-  int64_t num_removals_known_ = 0;           // what deltas below this number removed is known
-  int64_t last_news_us_ = 0;                 // when the last pose, change of the map or end came
-  std::optional<int64_t> complete_us_;       // when the ends, all poses and the whole map were there
-  std::map<std::string, int64_t> heard_us_;  // by stage: when its last status came
   bool is_written_ = false;
 };
 

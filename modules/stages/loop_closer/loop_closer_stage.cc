@@ -4,20 +4,24 @@
 #include <utility>
 
 #include "core/errors.h"
+#include "core/session_actions.h"
 
 namespace tessera {
 namespace {
 
-LoopCloserOptions OptionsFrom(const Settings& settings) {
-  LoopCloserOptions options;
+LoopCloserSessionOptions OptionsFrom(const Settings& settings) {
+  LoopCloserSessionOptions result;
+  LoopCloserOptions& options = result.loop_closer;
   options.verification.min_matches = settings.Get<int>("loop_closer.min_matches");
   options.verification.similarity.min_inliers = settings.Get<int>("loop_closer.min_aligned");
   options.verification.min_seen = settings.Get<int>("loop_closer.min_seen");
   options.relocalization.min_seen = settings.Get<int>("loop_closer.min_relocalized");
   options.verification.min_coverage = options.relocalization.min_coverage =
       settings.Get<double>("loop_closer.min_coverage");
-  if (const std::string problem = options.Check(); !problem.empty()) throw InputError("loop_closer: " + problem);
-  return options;
+  ThrowIfFailed<InputError>(options.Check(), "loop_closer: ");
+  result.closes_loops = settings.Get<bool>("mapper.close_loops");
+  result.loop_delay_keyframes = settings.Get<int>("mapper.loop_delay_keyframes");
+  return result;
 }
 
 std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
@@ -29,83 +33,50 @@ std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
 
 LoopCloserStage::LoopCloserStage(StageContext& context)
     : context_(context),
-      loop_closer_(VocabularyFrom(context.settings()), OptionsFrom(context.settings())),
-      closes_loops_(context.settings().Get<bool>("mapper.close_loops")),
-      loop_delay_keyframes_(context.settings().Get<int>("mapper.loop_delay_keyframes")),
-      map_(context, true, [this] { OnDeltas(); }) {
-  results_ = context.Advertise(kLoopResult);
-  answers_ = context.Advertise(kRelocalization);
+      session_(VocabularyFrom(context.settings()), OptionsFrom(context.settings())),
+      map_(
+          context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); },
+          [this] {
+            if (map_.is_complete()) context_.Finish();
+          }),
+      results_(context.Advertise(kLoopResult)),
+      answers_(context.Advertise(kRelocalization)) {
   context.Subscribe(kRelocalizationRequest, [this](const RelocalizationRequest& request) {
-    requests_.push_back(request);
-    AnswerRequests();
+    session_.Receive(request);
+    Advance();
   });
-  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
-    if (end.stage != StageKind::kMapper) return;
-    mapper_end_ = end;
-    map_.Expect(end.num_values);
-    FinishIfDone();
-  });
+  map_.FollowToEnd();
 }
 
-void LoopCloserStage::OnDeltas() {
-  for (const auto& delta : map_.Take()) {
-    if (const Result<> applied = loop_closer_.ApplyDelta(*delta); !applied) {
-      map_.Reject(applied.error().sentence);
-      return;
-    }
-    if (closes_loops_) FindLoop(*delta);
-    AnswerRequests();
-  }
-  FinishIfDone();
+Result<> LoopCloserStage::Apply(const MapDelta& delta) {
+  Result<> applied = session_.Receive(delta);
+  Advance();
+  return applied;
 }
 
-// One result for each keyframe, on the map right after it came in. What is found on a map that a loop is about to bend
-// would be void, so it is not looked for.
-void LoopCloserStage::FindLoop(const MapDelta& delta) {
-  const KeyframeId id = delta.answers;
-  // Says nothing new, but to one that was started again since the loop was found.
-  if (!delta.is_snapshot && !delta.closed_loops.empty()) bends_at_ = id;
-  const bool is_new = delta.is_snapshot || (!delta.new_keyframes.empty() && delta.new_keyframes.back().id == id);
-  if (!id.valid() || !is_new) return;
-  LoopResult result;
-  result.answers = id;
-  if (!bends_at_ || id >= *bends_at_) {
+void LoopCloserStage::Advance() {
+  const Overloaded publish{
+      [](std::monostate) {},
+      [this](const LoopResult& result) { results_.Publish(result); },
+      [this](const RelocalizationAnswer& answer) { answers_.Publish(answer); },
+  };
+  while (session_.state() != LoopCloserSession::State::kIdle) {
     const StepTimer timer(context_);
-    result = loop_closer_.FindLoop(id);
-  }
-  if (result.matched.valid()) bends_at_ = {id.value + loop_delay_keyframes_};
-  results_.Publish(result);
-  num_candidates_ += result.num_candidates;
-  num_consistent_ += result.num_consistent;
-  num_matched_ += result.num_matched;
-  num_aligned_ += result.num_aligned;
-  num_confirmed_ += result.matched.valid() ? 1 : 0;
-  context_.SetValue("loop_candidates", static_cast<double>(num_candidates_));
-  context_.SetValue("loop_consistent", static_cast<double>(num_consistent_));
-  context_.SetValue("loop_matched", static_cast<double>(num_matched_));
-  context_.SetValue("loop_aligned", static_cast<double>(num_aligned_));
-  context_.SetValue("loop_confirmed", static_cast<double>(num_confirmed_));
-}
-
-// A question is about the map after the last keyframe that the tracker had sent.
-void LoopCloserStage::AnswerRequests() {
-  while (!requests_.empty() && loop_closer_.map().next_delta() > 0 && !map_.needs_snapshot() &&
-         loop_closer_.map().answered() >= requests_.front().last_keyframe) {
-    const RelocalizationRequest request = std::move(requests_.front());
-    requests_.pop_front();
-    const StepTimer timer(context_);
-    const RelocalizationAnswer answer = loop_closer_.Relocalize(request);
-    answers_.Publish(answer);
-    ++num_asked_;
-    num_found_ += answer.reference.valid() ? 1 : 0;
-    context_.SetValue("relocalization_asked", static_cast<double>(num_asked_));
-    context_.SetValue("relocalization_found", static_cast<double>(num_found_));
+    std::visit(publish, session_.Advance());
+    ShowCounts();
   }
 }
 
-void LoopCloserStage::FinishIfDone() {
-  if (context_.finished() || !mapper_end_ || loop_closer_.map().next_delta() < mapper_end_->num_values) return;
-  context_.Finish();
+void LoopCloserStage::ShowCounts() {
+  const LoopCounts& counts = session_.counts();
+  const auto show = [this](const char* name, int64_t count) { context_.SetValue(name, static_cast<double>(count)); };
+  show("loop_candidates", counts.num_candidates);
+  show("loop_consistent", counts.num_consistent);
+  show("loop_matched", counts.num_matched);
+  show("loop_aligned", counts.num_aligned);
+  show("loop_confirmed", counts.num_confirmed);
+  show("relocalization_asked", counts.num_asked);
+  show("relocalization_found", counts.num_found);
 }
 
 }  // namespace tessera

@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "evaluation/map_text.h"
-#include "evaluation/run_files.h"
 
 namespace tessera {
 namespace {
@@ -23,31 +23,21 @@ MapWriterStage::MapWriterStage(StageContext& context)
     : context_(context),
       path_(PathFrom(context.settings())),
       follows_(context.settings().Get<bool>("map_writer.follow")),
-      map_(context, true, [this] { OnDeltas(); }) {
-  context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
-    if (end.stage != StageKind::kMapper) return;
-    mapper_end_ = end;
-    map_.Expect(end.num_values);
-    WriteIfDone();
-  });
+      map_(
+          context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); }, [this] { WriteIfDone(); }) {
+  map_.FollowToEnd();
 }
 
-void MapWriterStage::OnDeltas() {
-  for (const auto& delta : map_.Take()) {
-    if (const Result<> applied = replica_.Apply(*delta); !applied) {
-      map_.Reject(applied.error().sentence);
-      return;
-    }
-    context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));
-  }
-  WriteIfDone();
+Result<> MapWriterStage::Apply(const MapDelta& delta) {
+  TESSERA_RETURN_IF_FAILED(replica_.Apply(delta));
+  context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));
+  return {};
 }
 
 // Each delta brought the owner's hash, and Apply() compared it: a replica that is not rejected has the owner's map.
 void MapWriterStage::WriteIfDone() {
-  const bool is_last = mapper_end_ && replica_.next_delta() >= mapper_end_->num_values;
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
-  if (context_.finished() || !is_there || (follows_ && !is_last)) return;
+  if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
   try {
     WriteFile(path_, PlyText(replica_));
   } catch (const InputError& error) {

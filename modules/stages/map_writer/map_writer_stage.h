@@ -1,11 +1,9 @@
 // Wiring of the map writer: joins a running stack at any time, follows the map, and writes it as a cloud of points.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "map/map.h"
-#include "messages/end_of_stream.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
 
@@ -17,7 +15,7 @@ class MapWriterStage {
   explicit MapWriterStage(StageContext& context);
 
  private:
-  void OnDeltas();
+  Result<> Apply(const MapDelta& delta);
   void WriteIfDone();
 
   StageContext& context_;
@@ -25,7 +23,6 @@ class MapWriterStage {
   const bool follows_;
   MapSubscription map_;
   Map replica_;
-  std::optional<EndOfStream> mapper_end_;
 };
 
 }  // namespace tessera

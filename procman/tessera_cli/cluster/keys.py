@@ -1,15 +1,14 @@
-"""tessera keys: who may give orders. Ed25519, by PyNaCl.
+"""The keys that decide whose orders deputies obey: Ed25519, by PyNaCl.
 
 The folder ~/.config/tessera (or TESSERA_KEYS) holds `sheriff.key`, this user's secret key, and `trusted_keys`, rows of
-NAME PUBLIC-KEY whose orders a deputy of this user obeys. Both are made when first needed, with the user's own key as the
-first one trusted: on one machine there is nothing to set up.
+NAME PUBLIC-KEY whose orders a deputy of this user obeys. Both are created when first needed, and the user's own key is
+the first one trusted: on a single machine nothing has to be set up.
 """
 
 import base64
 import binascii
 import os
 import re
-from argparse import Namespace
 from pathlib import Path
 
 from nacl.signing import SigningKey
@@ -20,30 +19,6 @@ from tessera_cli.files import write_text
 KEY_BYTES = 32
 OWN_NAME = "me"
 NAME = re.compile(r"[A-Za-z0-9_.@-]{1,64}")
-
-
-def main(arguments: Namespace) -> int:
-    ring = KeyRing(key_folder())
-    match arguments.action:
-        case "trust":
-            ring.trust(arguments.name, arguments.key)
-            print(f"tessera: deputies of this user now obey {arguments.name}.")
-        case "revoke":
-            ring.revoke(arguments.name)
-            print(f"tessera: deputies of this user no longer obey {arguments.name}.")
-        case "make":
-            ring.make()
-            print(f"tessera: a new key is in {ring.secret_path}; the old one is no longer trusted here.")
-    _print(ring)
-    return 0
-
-
-def _print(ring: "KeyRing") -> None:
-    print(f"this user's orders are signed with  {to_text(ring.signing_key().verify_key.encode())}")
-    print("orders obeyed by deputies of this user:")
-    for name, key in ring.trusted().items():
-        print(f"  {name:16s} {to_text(key)}")
-    print("To be obeyed on another node, do there: procman/tessera keys trust NAME KEY")
 
 
 def key_folder() -> Path:
@@ -68,17 +43,22 @@ def from_text(text: str) -> bytes:
 
 
 class KeyRing:
+    """The keys in one folder. All methods raise UserError if a file is invalid or can't be written."""
+
     def __init__(self, folder: Path) -> None:
         self.secret_path = folder / "sheriff.key"
         self.trusted_path = folder / "trusted_keys"
 
     def signing_key(self) -> SigningKey:
-        """Made at the first call."""
+        """Created by the first call."""
         if not self.secret_path.exists():
             self.make()
         if self.secret_path.stat().st_mode & 0o077:
             raise UserError(f"{self.secret_path} can be read by others; do: chmod 600 {self.secret_path}")
         return SigningKey(self._parse(self.secret_path.read_text().strip(), str(self.secret_path)))
+
+    def own_public_key(self) -> str:
+        return to_text(self.signing_key().verify_key.encode())
 
     def make(self) -> None:
         """A new key, trusted instead of the old one."""
@@ -107,7 +87,7 @@ class KeyRing:
     def revoke(self, name: str) -> None:
         keys = self.trusted()
         if keys.pop(name, None) is None:
-            raise UserError(f"no key of the name '{name}' is trusted; there are: {', '.join(keys) or 'none'}.")
+            raise UserError(f"no key of the name '{name}' is trusted; known: {', '.join(keys) or 'none'}.")
         self._write(keys)
 
     def _read(self) -> dict[str, bytes]:
@@ -130,8 +110,8 @@ class KeyRing:
             raise UserError(f"{self.trusted_path} can't be written: {error.strerror}.") from error
 
     @staticmethod
-    def _parse(text: str, where: str) -> bytes:
+    def _parse(text: str, place: str) -> bytes:
         try:
             return from_text(text)
         except ValueError as error:
-            raise UserError(f"{where}: this is no Ed25519 key: {error}.") from error
+            raise UserError(f"{place}: this is no Ed25519 key: {error}.") from error

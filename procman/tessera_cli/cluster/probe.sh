@@ -1,5 +1,5 @@
-# Tells what a node has, in lines WORD VALUE that node_facts.py reads. Runs there in any POSIX shell and changes nothing.
-# $1: Tessera's folder, absolute or from the home folder; the others: Debian packages.
+# Reports what a node has, in lines WORD VALUE that node_facts.py parses. Runs there in any POSIX shell and changes
+# nothing. $1: Tessera's folder, absolute or from the home folder; the others: Debian packages.
 folder="$1"
 shift
 cd || exit 1
@@ -29,7 +29,7 @@ echo "home $(pwd -P)"
 if [ -r build/.prebuilt ]; then
   echo "build current"
 elif [ -e build/.built ]; then
-  # deploy leaves the times of files alone, so that what it changed is newer than what was built before.
+  # deploy does not set the times of files, so that a file that it changed is newer than the last build.
   newer="$(find CMakeLists.txt modules lcmtypes procman tests -type f -newer build/.built \
     \( -name '*.cc' -o -name '*.h' -o -name '*.lcm' -o -name '*.in' -o -name CMakeLists.txt \) | head -n 1)"
   if [ -z "$newer" ]; then echo "build current"; else echo "build old"; fi

@@ -1,4 +1,4 @@
-"""tessera evaluate: the error of runs or trajectory files against ground truth, printed, and as a report for people."""
+"""tessera evaluate: the error of runs or trajectory files against ground truth, printed and as a report."""
 
 from argparse import Namespace
 from dataclasses import replace
@@ -8,13 +8,16 @@ import numpy as np
 
 from tessera_cli.errors import UserError
 from tessera_cli.runs.run_folder import Result, read_pair, read_run
+from tessera_cli.runs.trajectories import TrajectoryError
+
+HEADINGS = ("RMS m", "mean m", "median m", "95 % m", "max m")
 
 
-def main(arguments: Namespace) -> int:
+def evaluate(arguments: Namespace) -> int:
     paths = [Path(text) for text in arguments.paths]
-    # A file behind others is the truth of them all.
+    # A file after others is the truth of them all.
     truth = paths.pop() if len(paths) > 1 and not paths[-1].is_dir() else None
-    results = _name_apart([_read(path, truth, arguments) for path in paths], paths)
+    results = _with_distinct_names([_read(path, truth, arguments) for path in paths], paths)
     if len(results) == 1:
         _print_one(results[0])
     else:
@@ -25,7 +28,7 @@ def main(arguments: Namespace) -> int:
 
 
 def _read(path: Path, truth: Path | None, arguments: Namespace) -> Result:
-    """Without a report nothing but the error counts, so that it must be there."""
+    """Without a report only the error is shown, so there must be one."""
     if not path.is_dir():
         if truth is None:
             raise UserError(f"{path} brings no ground truth: give GROUND_TRUTH as the last argument.")
@@ -38,7 +41,7 @@ def _read(path: Path, truth: Path | None, arguments: Namespace) -> Result:
     return result
 
 
-def _name_apart(results: list[Result], paths: list[Path]) -> list[Result]:
+def _with_distinct_names(results: list[Result], paths: list[Path]) -> list[Result]:
     """Those of one name get their folders' names too."""
     names = [result.name for result in results]
     return [
@@ -47,42 +50,40 @@ def _name_apart(results: list[Result], paths: list[Path]) -> list[Result]:
     ]
 
 
+def _statistics(error: TrajectoryError) -> tuple[float, ...]:
+    """As HEADINGS."""
+    errors = error.errors_m
+    return (error.rms_m, errors.mean(), np.median(errors), np.percentile(errors, 95), errors.max())
+
+
 def _print_one(result: Result) -> None:
     error = result.error
     if error is None:
         print(f"RMS error  not measured: {result.error_note}")
         return
-    errors = error.errors_m
-    print(f"poses      {len(errors)} of {error.num_estimated} have a ground truth")
+    rms, mean, median, p95, largest = _statistics(error)
+    print(f"poses      {len(error.errors_m)} of {error.num_estimated} have a ground truth")
     print(f"alignment  {error.alignment}, scale {error.scale:.6f}")
-    print(f"RMS error  {error.rms_m:.4f} m")
-    print(
-        f"           mean {errors.mean():.4f} m, median {np.median(errors):.4f} m, 95 % {np.percentile(errors, 95):.4f} m, "
-        f"max {errors.max():.4f} m"
-    )
+    print(f"RMS error  {rms:.4f} m")
+    print(f"           mean {mean:.4f} m, median {median:.4f} m, 95 % {p95:.4f} m, max {largest:.4f} m")
 
 
 def _print_table(results: list[Result]) -> None:
     width = max(len(result.name) for result in results)
-    print(
-        f"{'':{width}}  {'poses':>6}  {'RMS m':>9}  {'mean m':>9}  {'median m':>9}  {'95 % m':>9}  {'max m':>9}  alignment"
-    )
+    headings = "  ".join(f"{heading:>9}" for heading in HEADINGS)
+    print(f"{'':{width}}  {'poses':>6}  {headings}  alignment")
     for result in results:
         error = result.error
         if error is None:
             print(f"{result.name:{width}}  not measured: {result.error_note}")
             continue
-        errors = error.errors_m
-        figures = (error.rms_m, errors.mean(), np.median(errors), np.percentile(errors, 95), errors.max())
-        print(
-            f"{result.name:{width}}  {len(errors):6}  "
-            + "  ".join(f"{figure:9.4f}" for figure in figures)
-            + f"  {error.alignment}, scale {error.scale:.6g}"
-        )
+        figures = "  ".join(f"{figure:9.4f}" for figure in _statistics(error))
+        alignment = f"{error.alignment}, scale {error.scale:.6g}"
+        print(f"{result.name:{width}}  {len(error.errors_m):6}  {figures}  {alignment}")
 
 
 def _write_report(results: list[Result], path: Path) -> None:
-    from tessera_cli.report.html_report import write_report
+    from tessera_cli.report.html_report import write_report  # late: the figures take a second to load
 
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise UserError(f"--report {path}: name a file in a folder that exists.")

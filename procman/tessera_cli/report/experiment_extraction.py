@@ -1,31 +1,37 @@
-"""tessera experiment NAME: measurements, printed as a table and kept as CSV and a plot under logs/."""
+"""Experiment extraction: time per image, compared with cv::ORB, as a table, a CSV file and a plot."""
 
 import csv
-import datetime
 import json
-import os
 import subprocess
-from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from tessera_cli.errors import RunFailed, UserError
-from tessera_cli.files import BUILD, ROOT, unfinished
-from tessera_cli.report.experiment_places import measure_places
-from tessera_cli.report.experiment_worlds import measure_worlds
+from matplotlib.figure import Figure
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from tessera_cli.console import say
+from tessera_cli.errors import RunError
+from tessera_cli.files import BUILD, replacing
+from tessera_cli.report.trajectory_plot import save_png
+from tessera_cli.runs.run_folder import new_folder
 
 BENCHMARK = BUILD / "tests" / "benchmarks" / "features_benchmark"
 REFERENCE = "CvOrb"
 WHOLE = "Extraction/whole"
-# The median of so many interleaved repetitions: a short disturbance of the machine hits few of them.
+# The median of so many interleaved repetitions: a short disturbance of the machine affects only a few of them.
 REPETITIONS = 5
 TABLE_WIDTH = 130
-# What the benchmarks count beside time, where they do.
+# What some benchmarks count besides time.
 COUNTERS = ("keypoints", "candidates", "wire_kB", "repeatability")
 
 
 @dataclass(frozen=True)
 class Row:
+    """One benchmark."""
+
     name: str
     cpu_ms: float  # median over the repetitions of the mean per image, one thread
     of_reference: float  # times cv::ORB
@@ -33,20 +39,10 @@ class Row:
     counters: dict[str, float]
 
 
-def main(arguments: Namespace) -> int:
-    if arguments.name == "places":
-        return measure_places(arguments.sources)
-    if arguments.name == "worlds":
-        return measure_worlds(arguments.sources)
-    if arguments.sources:
-        raise UserError("experiment extraction takes no SOURCE: its images are its own.")
-    return measure_extraction()
-
-
 def measure_extraction() -> int:
-    print(f"tessera: measuring extraction, {REPETITIONS} repetitions on one thread; takes a minute or two", flush=True)
+    say(f"measuring extraction, {REPETITIONS} repetitions on one thread; takes a minute or two")
     rows = _to_rows(_run_benchmark())
-    folder = ROOT / "logs" / f"{datetime.datetime.now():%Y-%m-%d-%H%M%S}-experiment-extraction"
+    folder = new_folder("experiment-extraction")
     folder.mkdir(parents=True, exist_ok=True)
     _print_table(rows)
     _write_csv(rows, folder / "extraction.csv")
@@ -55,46 +51,42 @@ def measure_extraction() -> int:
     return 0
 
 
-def _run_benchmark() -> list[dict]:
+def _run_benchmark() -> list[dict[str, Any]]:
     if not BENCHMARK.is_file():
-        raise RunFailed(f"{BENCHMARK} is missing; procman/tessera setup builds it.")
-    command = [
-        BENCHMARK,
+        raise RunError(f"{BENCHMARK} is missing; procman/tessera setup builds it.")
+    options = [
         "--benchmark_format=json",
         f"--benchmark_repetitions={REPETITIONS}",
         "--benchmark_enable_random_interleaving=true",
         "--benchmark_min_time=0.3",
     ]
-    finished = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    finished = subprocess.run([BENCHMARK, *options], capture_output=True, text=True)
     if finished.returncode != 0:
-        raise RunFailed(f"{BENCHMARK.name} failed: {finished.stderr.strip().splitlines()[-1:]}")
+        raise RunError(f"{BENCHMARK.name} failed: {finished.stderr.strip().splitlines()[-1:]}")
     return json.loads(finished.stdout)["benchmarks"]
 
 
-def _to_rows(results: list[dict]) -> list[Row]:
+def _to_rows(results: list[dict[str, Any]]) -> list[Row]:
     medians = {result["run_name"]: result for result in results if result.get("aggregate_name") == "median"}
     if REFERENCE not in medians or WHOLE not in medians:
-        raise RunFailed(f"{BENCHMARK.name} measured neither {REFERENCE} nor {WHOLE}.")
+        raise RunError(f"{BENCHMARK.name} measured neither {REFERENCE} nor {WHOLE}.")
     reference_ms, whole_ms = medians[REFERENCE]["cpu_time"], medians[WHOLE]["cpu_time"]
     return [
         Row(
-            name,
-            result["cpu_time"],
-            result["cpu_time"] / reference_ms,
-            result["cpu_time"] / whole_ms,
-            {counter: result[counter] for counter in COUNTERS if counter in result},
+            name=name,
+            cpu_ms=result["cpu_time"],
+            of_reference=result["cpu_time"] / reference_ms,
+            of_whole=result["cpu_time"] / whole_ms,
+            counters={counter: result[counter] for counter in COUNTERS if counter in result},
         )
-        for name, result in sorted(medians.items())
-    ]  # they come in random order
+        for name, result in sorted(medians.items())  # they come in random order
+    ]
 
 
 def _print_table(rows: list[Row]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     counters = [counter for counter in COUNTERS if any(counter in row.counters for row in rows)]
-    table = Table(title="Time per KITTI image, 2000 keypoints, one thread", box=box.SIMPLE_HEAD, padding=(0, 1))
+    title = "Time per KITTI image, 2000 keypoints, one thread"
+    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1))
     table.add_column("what", no_wrap=True)
     for heading in ("CPU ms", "x cv::ORB", "x whole", *counters):
         table.add_column(heading, justify="right")
@@ -102,26 +94,20 @@ def _print_table(rows: list[Row]) -> None:
         figures = [f"{row.counters[counter]:.4g}" if counter in row.counters else "" for counter in counters]
         table.add_row(row.name, f"{row.cpu_ms:.2f}", f"{row.of_reference:.2f}", f"{row.of_whole:.2f}", *figures)
     console = Console()
-    console.width = max(console.width, TABLE_WIDTH)  # figures must not be cut short where there is no wide terminal
+    console.width = max(console.width, TABLE_WIDTH)  # figures must not be cut off where there is no wide terminal
     console.print(table)
 
 
 def _write_csv(rows: list[Row], path: Path) -> None:
-    with open(unfinished(path), "w", newline="") as file:
+    with replacing(path) as written, open(written, "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["what", "cpu_ms", "times_cv_orb", "times_whole", *COUNTERS])
         for row in rows:
-            writer.writerow(
-                [row.name, row.cpu_ms, row.of_reference, row.of_whole, *(row.counters.get(c, "") for c in COUNTERS)]
-            )
-    os.replace(unfinished(path), path)
+            counters = (row.counters.get(counter, "") for counter in COUNTERS)
+            writer.writerow([row.name, row.cpu_ms, row.of_reference, row.of_whole, *counters])
 
 
 def _plot(rows: list[Row], path: Path) -> None:
-    from matplotlib.figure import Figure
-
-    from tessera_cli.report.trajectory_plot import save
-
     figure = Figure(figsize=(9, 0.5 * len(rows) + 1.5), layout="constrained")
     axes = figure.subplots()
     axes.barh([row.name for row in rows], [row.cpu_ms for row in rows], color="tab:blue")
@@ -131,4 +117,4 @@ def _plot(rows: list[Row], path: Path) -> None:
     axes.set_xlabel("CPU time per image [ms]")
     axes.grid(axis="x", alpha=0.3)
     axes.legend()
-    save(figure, path)
+    save_png(figure, path)

@@ -1,15 +1,18 @@
-"""Figures of matplotlib as SVG inside a page, in the page's own colours, so that they follow light and dark.
+"""Figures of matplotlib as SVG inside a page, in the page's own colors, so that they follow its light and dark themes.
 
-A figure is drawn in stand-in colours (INK, GRID, TRUTH, SERIES ...); in the SVG each becomes a CSS variable.
+A figure is drawn in placeholder colors (INK, GRID, TRUTH, SERIES ...); in the SVG each becomes a CSS variable.
 """
 
 import hashlib
 import io
 import re
-import xml.etree.ElementTree as ElementTree
+from contextlib import AbstractContextManager
+from typing import Any
+from xml.etree import ElementTree
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 SVG = "http://www.w3.org/2000/svg"
 XLINK = "http://www.w3.org/1999/xlink"
@@ -24,7 +27,7 @@ VARIABLES = {
     **{color: f"--series-{number}" for number, color in enumerate(SERIES, start=1)},
 }
 # Texts stay texts: readable for screen readers and searchable; the page gives them its font.
-STYLE = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "font.size": 12,
     "axes.titlesize": 12,
@@ -59,14 +62,11 @@ POINTS_PER_INCH = 72
 
 def new_figure(width: float, height: float) -> Figure:
     """`width` and `height` in the SVG's own units, in which texts are 11 and 12 high. Use within `drawing_style()`."""
-    figure = Figure(
-        figsize=(width / POINTS_PER_INCH, height / POINTS_PER_INCH), dpi=POINTS_PER_INCH, layout="constrained"
-    )
-    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03)
-    return figure
+    engine = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03)
+    return Figure(figsize=(width / POINTS_PER_INCH, height / POINTS_PER_INCH), dpi=POINTS_PER_INCH, layout=engine)
 
 
-def drawing_style():
+def drawing_style() -> AbstractContextManager[None]:
     """A context in which to draw and to save."""
     return rc_context(STYLE)
 
@@ -89,13 +89,13 @@ def to_svg(figure: Figure, key: str, label: str) -> str:
     text = ElementTree.tostring(root, encoding="unicode")
     for color, variable in VARIABLES.items():
         text = text.replace(color, f"var({variable})")
-    # The page's font, whatever matplotlib measured with.
+    # In the page's font, not the one that matplotlib measured with.
     return re.sub(r"font: ([\d.]+px) [^;\"]*", r"font-size: \1", text)
 
 
 def _make_ids_unique(root: ElementTree.Element, suffix: str) -> None:
-    """Ids that nothing refers to go; the others get a suffix, as they must differ over the whole page."""
-    used = set()
+    """Ids that nothing refers to are removed; the others get a suffix, since they must be unique on the whole page."""
+    used: set[str] = set()
     for element in root.iter():
         for value in element.attrib.values():
             used.update(re.findall(r"url\(#([^)]+)\)", value))

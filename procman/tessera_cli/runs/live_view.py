@@ -1,88 +1,108 @@
-"""What a person sees while a run goes on: one live panel in a terminal, a plain line every few seconds without one."""
+"""What a person sees during a run: a live panel in a terminal, a plain line every few seconds without one."""
 
 import sys
 import time
+from typing import Protocol, Self
 
-from tessera_cli.supervision.progress import STATE_NAMES, Progress, StageReport
+from rich import box
+from rich.console import Console, Group
+from rich.live import Live
+from rich.panel import Panel
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as ProgressBars
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
-PANEL_PERIOD_S = 0.25
-LINE_PERIOD_S = 5.0
-# Above this number, the extractors share one row.
-MAX_EXTRACTOR_ROWS = 4
+from tessera_cli.console import say
+from tessera_cli.constants import LINE_PERIOD_S, MAX_EXTRACTORS_SHOWN, RUN_PANEL_PERIOD_S
+from tessera_cli.supervision.progress import RUNNING, STAGE_STATES, Progress, StageReport, format_duration
 
-
-def make_view(title: str):
-    return Panel(title) if sys.stdout.isatty() else Lines(title)
-
-
-def make_count(title: str, total: int | None):
-    """Shows how many frames of `total` are done; None: nobody knows how many there will be."""
-    return CountBar(title, total) if sys.stdout.isatty() else CountLines(title, total)
-
-
-def describe_time(seconds: float | None) -> str:
-    if seconds is None:
-        return "-:--"
-    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+MAX_WIDTH = 80
 
 
-class Lines:
+class RunView(Protocol):
+    """Shows a run between entering and leaving its context."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def say(self, sentence: str) -> None: ...
+
+    def update(self, progress: Progress) -> None: ...
+
+
+class Counter(Protocol):
+    """Shows a number that grows, between entering and leaving its context."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def update(self, number: int) -> None: ...
+
+
+def make_run_view(title: str) -> RunView:
+    return RunPanel(title) if sys.stdout.isatty() else RunLines(title)
+
+
+def make_counter(title: str, total: int | None) -> Counter:
+    """Shows how many frames of `total` are done; None: the number is unknown."""
+    return CounterBar(title, total) if sys.stdout.isatty() else CounterLines(title, total)
+
+
+class _Context:
+    """A view that has nothing to open or close."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+class RunLines(_Context):
     """For logs and pipes."""
 
     def __init__(self, title: str) -> None:
         self._last = time.monotonic()
-        print(f"tessera: {title}", flush=True)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
+        say(title)
 
     def say(self, sentence: str) -> None:
-        print(f"tessera: {sentence}", flush=True)
+        say(sentence)
 
     def update(self, progress: Progress) -> None:
         if time.monotonic() - self._last < LINE_PERIOD_S:
             return
         self._last = time.monotonic()
-        of_all = f" of {progress.num_frames}" if progress.num_frames else ""
-        print(
-            f"tessera: frame {progress.num_poses}{of_all}, {progress.frames_per_s:.1f}/s, "
-            f"{describe_time(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
-            f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, {progress.num_dropped} dropped",
-            flush=True,
+        say(
+            f"frame {progress.num_poses}{progress.of_all_frames}, {progress.frames_per_s:.1f}/s, "
+            f"{format_duration(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
+            f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, "
+            f"{progress.num_dropped} dropped"
         )
 
 
-class CountLines:
-    """One number that grows, for logs and pipes."""
+class CounterLines(_Context):
+    """For logs and pipes."""
 
     def __init__(self, title: str, total: int | None) -> None:
         self._last = time.monotonic()
         self._title = title
         self._of_all = f" of {total}" if total else ""
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
     def update(self, number: int) -> None:
         if time.monotonic() - self._last >= LINE_PERIOD_S:
             self._last = time.monotonic()
-            print(f"tessera: {self._title}: frame {number}{self._of_all}", flush=True)
+            say(f"{self._title}: frame {number}{self._of_all}")
 
 
-class CountBar:
-    """The same as a bar, redrawn in place."""
+class CounterBar:
+    """Redrawn in place."""
 
     def __init__(self, title: str, total: int | None) -> None:
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-        from rich.progress import Progress as Bars
-
-        self._bars = Bars(
+        self._bars = ProgressBars(
             TextColumn("tessera: {task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
@@ -92,71 +112,56 @@ class CountBar:
         )
         self._task = self._bars.add_task(title, total=total)
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         self._bars.start()
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self._bars.stop()
 
     def update(self, number: int) -> None:
         self._bars.update(self._task, completed=number)
 
 
-class Panel:
+class RunPanel:
     """Redrawn in place. Fits 80 columns."""
 
     def __init__(self, title: str) -> None:
-        from rich.console import Console
-        from rich.live import Live
-
         self._title = title
         self._last = 0.0
         self._live = Live(console=Console(), auto_refresh=False, vertical_overflow="ellipsis")
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         self._live.start()
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self._live.stop()
 
     def say(self, sentence: str) -> None:
         self._live.console.print(f"tessera: {sentence}", markup=False, highlight=False)
 
     def update(self, progress: Progress) -> None:
-        if time.monotonic() - self._last < PANEL_PERIOD_S:
+        if time.monotonic() - self._last < RUN_PANEL_PERIOD_S:
             return
         self._last = time.monotonic()
         self._live.update(self._draw(progress), refresh=True)
 
-    def _draw(self, progress: Progress):
-        from rich import box
-        from rich.console import Group
-        from rich.panel import Panel as Frame
-        from rich.text import Text
-
+    def _draw(self, progress: Progress) -> Panel:
         content = Group(_draw_bar(progress), Text(_tracking_line(progress)), _draw_stages(progress))
-        return Frame(
-            content,
-            title=Text(self._title, overflow="ellipsis"),
-            box=box.ROUNDED,
-            width=min(80, self._live.console.width),
-        )
+        title = Text(self._title, overflow="ellipsis")
+        return Panel(content, title=title, box=box.ROUNDED, width=min(MAX_WIDTH, self._live.console.width))
 
 
-def _draw_bar(progress: Progress):
-    from rich.progress_bar import ProgressBar
-    from rich.table import Table
-
+def _draw_bar(progress: Progress) -> Table:
     row = Table.grid(padding=(0, 1), expand=True)
     row.add_column(ratio=1)
     row.add_column(justify="right", no_wrap=True)
     of_all = f"/{progress.num_frames}" if progress.num_frames else ""
-    figures = f"{progress.num_poses}{of_all} frames  {progress.frames_per_s:5.1f}/s  {describe_time(progress.time_left_s)} left"
+    time_left = format_duration(progress.time_left_s)
     row.add_row(
         ProgressBar(total=progress.num_frames or None, completed=progress.num_poses, pulse=not progress.num_frames),
-        figures,
+        f"{progress.num_poses}{of_all} frames  {progress.frames_per_s:5.1f}/s  {time_left} left",
     )
     return row
 
@@ -168,10 +173,7 @@ def _tracking_line(progress: Progress) -> str:
     )
 
 
-def _draw_stages(progress: Progress):
-    from rich import box
-    from rich.table import Table
-
+def _draw_stages(progress: Progress) -> Table:
     table = Table(box=box.SIMPLE_HEAD, expand=True, padding=(0, 1), pad_edge=False)
     table.add_column("process", no_wrap=True)
     table.add_column("state", no_wrap=True)
@@ -185,16 +187,15 @@ def _draw_stages(progress: Progress):
 def _stage_rows(progress: Progress) -> list[tuple[str, ...]]:
     reports = sorted(progress.stages.values(), key=lambda report: report.name)
     extractors = [report for report in reports if report.name.startswith("extractor_")]
-    others = [report for report in reports if report not in extractors]
-    if len(extractors) > MAX_EXTRACTOR_ROWS:
-        return [_combined_row(extractors)] + [_row(report) for report in others]
-    return [_row(report) for report in reports]
+    if len(extractors) <= MAX_EXTRACTORS_SHOWN:
+        return [_row(report) for report in reports]
+    return [_combined_row(extractors)] + [_row(report) for report in reports if report not in extractors]
 
 
 def _row(report: StageReport) -> tuple[str, ...]:
     return (
         report.name,
-        STATE_NAMES[report.state],
+        STAGE_STATES[report.state],
         str(report.queue),
         f"{report.step_ms:.2f}",
         f"{report.cpu_percent:.0f}",
@@ -205,11 +206,11 @@ def _row(report: StageReport) -> tuple[str, ...]:
 
 def _combined_row(reports: list[StageReport]) -> tuple[str, ...]:
     """All extractors as one: sums, and the mean of their step times."""
-    running = sum(report.state == 1 for report in reports)
+    num_running = sum(report.state == RUNNING for report in reports)
     step_ms = sum(report.step_ms for report in reports) / len(reports)
     return (
         f"extractors ({len(reports)})",
-        f"{running} run",
+        f"{num_running} run",
         str(sum(report.queue for report in reports)),
         f"{step_ms:.2f}",
         f"{sum(report.cpu_percent for report in reports):.0f}",

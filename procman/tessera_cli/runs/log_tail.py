@@ -2,16 +2,17 @@
 
 import struct
 from pathlib import Path
+from typing import BinaryIO
 
 from tessera_cli.messages import camera_image_t
 
-# What stands before each event of an LCM log: sync word, number, time in us, lengths of the channel and of the data.
+# Before each event of an LCM log: sync word, number, time in us, lengths of the channel and of the data.
 HEADER = struct.Struct(">IqqII")
 SYNC = 0xEDA1DA01
 
 
 class LogTail:
-    """Reads on from where it was; what is not yet whole waits for the next time."""
+    """Continues where the last call stopped. An event that is not complete waits for the next call."""
 
     def __init__(self, path: Path, channel: str) -> None:
         self._path = path
@@ -32,8 +33,8 @@ class LogTail:
             self._num_frames = camera_image_t.decode(newest).frame + 1
         return self._num_frames
 
-    def _next(self, log, size: int) -> bytes | None:
-        """The data of the next event if it is of the channel, empty if it is of another; None at the end."""
+    def _next(self, log: BinaryIO, size: int) -> bytes | None:
+        """The data of the next event if it is on the channel, empty if it is on another one; None at the end."""
         log.seek(self._position)
         head = log.read(HEADER.size)
         if len(head) < HEADER.size:

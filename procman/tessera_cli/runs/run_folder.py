@@ -1,22 +1,64 @@
-"""What a run left in its folder, or what two trajectory files say, read for evaluation and report.
+"""The folder of a run: where it is, what an earlier run left in it, and its content read again as a Result.
 
-Positions of `Result.estimate` are in the estimate's own world; `Result.in_truth` takes them over into the truth's.
+Positions of `Result.estimate` are in the estimate's own world; `Result.in_truth` transforms them into the truth's.
 """
 
 import csv
+import datetime
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from tessera_cli.errors import UserError
+from tessera_cli.files import ROOT, absolute
+from tessera_cli.runs.sources import Source
 from tessera_cli.runs.trajectories import Trajectory, TrajectoryError, absolute_error, read_trajectory
+from tessera_cli.settings import Settings
 
+# What a run leaves; files of an earlier run in the same folder must not be taken for its own.
+RUN_FILES = (
+    "summary.json",
+    "run.json",
+    "report.html",
+    "trajectory.png",
+    "trajectory.txt",
+    "trajectory_live.txt",
+    "trajectory_kitti.txt",
+    "keyframes.txt",
+    "map.ply",
+    "map.tessera",
+    "ground_truth.txt",
+    "frames.csv",
+    "loops.csv",
+    "run.lcmlog",
+    "settings.yaml",
+)
 LOOP_COLUMNS = ("keyframe_timestamp_s", "matched_timestamp_s", "inliers", "scale")
 # Trajectory files keep microseconds.
 SAME_TIME_S = 1e-4
+
+Summary = dict[str, Any]  # of summary.json
+
+
+def new_folder(name: str) -> Path:
+    """The path of a folder under logs/ whose name begins with the present time."""
+    return ROOT / "logs" / f"{datetime.datetime.now():%Y-%m-%d-%H%M%S}-{name}"
+
+
+def choose_folder(out: str | None, source: Source) -> Path:
+    """Of --out, else under logs/."""
+    return absolute(out) if out else new_folder(source.name)
+
+
+def remove_earlier_run(folder: Path) -> None:
+    for name in RUN_FILES:
+        (folder / name).unlink(missing_ok=True)
+    for log in (folder / "stages").glob("*.log*"):
+        log.unlink()
 
 
 @dataclass(frozen=True)
@@ -25,7 +67,7 @@ class Frames:
 
     times_s: np.ndarray  # in the source
     states: list[str]  # initializing, tracked, lost
-    pose_time_ms: np.ndarray  # since the pose before was published
+    pose_time_ms: np.ndarray  # since the previous pose was published
     latency_ms: np.ndarray
     map_wait_ms: np.ndarray
     matches: np.ndarray
@@ -37,7 +79,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Loop:
-    """A place seen again: times of the two keyframes, as in trajectory.txt."""
+    """A closed loop: times of the two keyframes, as in trajectory.txt."""
 
     keyframe_s: float
     matched_s: float
@@ -46,18 +88,18 @@ class Loop:
 
 @dataclass(frozen=True)
 class Result:
-    """One run, or one trajectory with its truth. What there is not is None or empty."""
+    """One run, or one trajectory with its truth. What is missing is None or empty."""
 
     name: str
     estimate: Trajectory | None
     error: TrajectoryError | None = None
     error_note: str = ""  # why there is no error
     truth: Trajectory | None = None
-    live: Trajectory | None = None  # as it was published at the time
-    summary: dict = field(default_factory=dict)
+    live: Trajectory | None = None  # as it was published during the run
+    summary: Summary = field(default_factory=dict)
     frames: Frames | None = None
     loops: list[Loop] = field(default_factory=list)
-    settings: dict = field(default_factory=dict)  # sections of keys
+    settings: Settings = field(default_factory=dict)
     log_warnings: list[str] = field(default_factory=list)
 
     @property
@@ -65,12 +107,28 @@ class Result:
         return "map units" if self.error is None and self.summary.get("sensor", "mono") == "mono" else "m"
 
     def in_truth(self, positions: np.ndarray) -> np.ndarray:
-        """N x 3 of the estimate's world, where the alignment puts them; as they are without one."""
+        """N x 3 of the estimate's world, aligned to the truth; unchanged without a truth."""
         return self.error.align(positions) if self.error else positions
+
+    def path(self) -> np.ndarray:
+        """N x 3, the estimated positions aligned to the truth. The result must have an estimate."""
+        assert self.estimate is not None
+        return self.in_truth(self.estimate.positions)
+
+    def reference_path(self) -> np.ndarray:
+        """N x 3, the true positions where there is an error, else the estimated ones."""
+        return self.truth.positions if self.error and self.truth else self.path()
+
+    def loop_lines(self) -> list[np.ndarray]:
+        """For each loop, 2 x 3: the aligned positions of its two keyframes; NaN where there is no such keyframe."""
+        if self.estimate is None:
+            return []
+        ends = [positions_at(self.estimate, [loop.keyframe_s, loop.matched_s]) for loop in self.loops]
+        return [self.in_truth(positions) for positions in ends]
 
 
 def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None = None) -> Result:
-    """`alignment`: sim3 or se3, by default what the sensor knows. Raises UserError if it is no run's folder."""
+    """`alignment`: sim3 or se3, by default according to the sensor. Raises UserError if it is no run's folder."""
     if not any((folder / name).is_file() for name in ("summary.json", "trajectory.txt", "trajectory_kitti.txt")):
         raise UserError(f"{folder} is no run's folder: it holds no trajectory.txt.")
     summary = _read_summary(folder / "summary.json")
@@ -78,9 +136,8 @@ def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None
     estimate = _read_if_there(folder / "trajectory.txt")
     if truth_path and truth is None:
         raise UserError(f"{truth_path}: holds no pose.")
-    error, note = measure_error(
-        _what_goes_with(truth, estimate, folder), truth, alignment or default_alignment(summary)
-    )
+    matching = estimate if truth is None or truth.has_times else _read_if_there(folder / "trajectory_kitti.txt")
+    error, note = measure_error(matching, truth, alignment or default_alignment(summary))
     return Result(
         name=folder.absolute().name,
         estimate=estimate,
@@ -103,7 +160,7 @@ def read_pair(estimate_path: Path, truth_path: Path, alignment: str | None = Non
     return Result(name=estimate_path.stem, estimate=estimate, error=error, truth=truth)
 
 
-def default_alignment(summary: dict) -> str:
+def default_alignment(summary: Summary) -> str:
     """Mono doesn't know its scale; stereo and RGB-D must."""
     return "sim3" if summary.get("sensor", "mono") == "mono" else "se3"
 
@@ -122,20 +179,15 @@ def measure_error(
         return None, str(problem)
 
 
-def _what_goes_with(truth: Trajectory | None, estimate: Trajectory | None, folder: Path) -> Trajectory | None:
-    """The run's trajectory that belongs to the truth: by time or by frame."""
-    return estimate if truth is None or truth.has_times else _read_if_there(folder / "trajectory_kitti.txt")
-
-
 def _read_if_there(path: Path) -> Trajectory | None:
-    if not path.is_file() or not any(
-        line.strip() and not line.startswith("#") for line in path.read_text().splitlines()
-    ):
+    """None also if the file has no rows."""
+    if not path.is_file():
         return None
-    return read_trajectory(path)
+    has_rows = any(line.strip() and not line.startswith("#") for line in path.read_text().splitlines())
+    return read_trajectory(path) if has_rows else None
 
 
-def _read_summary(path: Path) -> dict:
+def _read_summary(path: Path) -> Summary:
     if not path.is_file():
         return {}
     try:
@@ -144,7 +196,7 @@ def _read_summary(path: Path) -> dict:
         raise UserError(f"{path}: is no JSON ({error}).") from error
 
 
-def _read_settings(path: Path) -> dict:
+def _read_settings(path: Path) -> Settings:
     return yaml.safe_load(path.read_text()) or {} if path.is_file() else {}
 
 
@@ -156,6 +208,7 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def read_frames(path: Path) -> Frames | None:
+    """None if there are no frames."""
     rows = _read_rows(path)
     if not rows:
         return None
@@ -182,27 +235,24 @@ def read_frames(path: Path) -> Frames | None:
 
 def read_loops(path: Path) -> list[Loop]:
     """Columns LOOP_COLUMNS; none if there is no file."""
+    keyframe, matched, inliers, _ = LOOP_COLUMNS
     try:
-        return [
-            Loop(float(row[LOOP_COLUMNS[0]]), float(row[LOOP_COLUMNS[1]]), int(float(row[LOOP_COLUMNS[2]])))
-            for row in _read_rows(path)
-        ]
+        return [Loop(float(row[keyframe]), float(row[matched]), int(float(row[inliers]))) for row in _read_rows(path)]
     except (KeyError, TypeError, ValueError) as error:
-        raise UserError(f"{path}: is no table of loops; its columns must be {', '.join(LOOP_COLUMNS)}.") from error
+        columns = ", ".join(LOOP_COLUMNS)
+        raise UserError(f"{path}: is no table of loops; its columns must be {columns}.") from error
 
 
 def read_log_warnings(folder: Path) -> list[str]:
-    """For each process that warned: how often, and its first words."""
+    """For each process that logged warnings or errors: how many, and the first one."""
     found = []
     for path in sorted(folder.glob("*.log")):
-        lines = [
-            line for line in path.read_text(errors="replace").splitlines() if " warning: " in line or " error: " in line
-        ]
-        if lines:
-            first = lines[0].split(": ", 1)[1]
-            found.append(
-                f"{path.stem} reported {len(lines)} {'problem' if len(lines) == 1 else 'problems'}, the first: {first}"
-            )
+        lines = path.read_text(errors="replace").splitlines()
+        warnings = [line for line in lines if " warning: " in line or " error: " in line]
+        if warnings:
+            first = warnings[0].split(": ", 1)[1]
+            count = f"{len(warnings)} {'problem' if len(warnings) == 1 else 'problems'}"
+            found.append(f"{path.stem} reported {count}, the first: {first}")
     return found
 
 

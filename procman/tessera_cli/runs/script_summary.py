@@ -1,19 +1,23 @@
-"""A script that runs a whole stack: watched meanwhile, and summed up as `tessera run` does when its evaluator has finished."""
+"""Watches a script that runs a whole stack on several nodes, and sums it up when its evaluator has finished."""
 
 import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tessera_cli import settings
+import numpy as np
+
 from tessera_cli.messages import procman_process_t, procman_status_t
-from tessera_cli.supervision.list_monitor import ListView
+from tessera_cli.runs.run_folder import read_frames
+from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summary
+from tessera_cli.settings import Settings, write_settings
+from tessera_cli.supervision.list_monitor import ListMonitor
 from tessera_cli.supervision.sheriff import Sheriff
 
 
 @dataclass
-class Life:
-    """Of a process from one start to its end, as deputies told of it last."""
+class ProcessUsage:
+    """Of a process from one start to its end, as last reported by its deputy."""
 
     deputy: str
     command: str
@@ -22,90 +26,86 @@ class Life:
     reason: str = ""
 
 
-class ScriptRun:
-    def __init__(self, sheriff: Sheriff, name: str, assignments: list[str], values: dict) -> None:
-        """`values`: the settings that `assignments` make."""
+class ScriptWatcher:
+    """Listens to deputies and stages while the script is carried out."""
+
+    def __init__(self, sheriff: Sheriff, name: str, assignments: list[str], values: Settings) -> None:
+        """`name`: of the list. `values`: the settings that `assignments` make."""
         self._name, self._assignments, self._values = name, assignments, values
-        self._view = ListView(values["bus"]["main_url"], values["bus"]["channel_prefix"])
-        self._lives: dict[tuple[str, int], Life] = {}  # by process and number of its start
-        self._earlier: dict[str, int] = {}  # number of starts before this run
-        self._camera_at: float | None = None
+        self._monitor = ListMonitor(values["bus"]["main_url"], values["bus"]["channel_prefix"])
+        self._usages: dict[tuple[str, int], ProcessUsage] = {}  # by process and number of its start
+        self._earlier_starts: dict[str, int] = {}  # before this run
+        self._camera_at: float | None = None  # monotonic seconds
         self._evaluator: procman_status_t | None = None  # of its deputy, when it had finished
-        sheriff.also_listen_to([self._view.bus])
+        sheriff.also_listen_to([self._monitor.bus])
         sheriff.on_status(self._on_status)
 
     def _on_status(self, status: procman_status_t) -> None:
         for process in [process for each in status.lists if each.name == self._name for process in each.processes]:
-            self._earlier.setdefault(process.name, process.num_starts - bool(process.pid))
+            self._earlier_starts.setdefault(process.name, process.num_starts - bool(process.pid))
             if not process.pid:
                 continue
-            life = self._lives.setdefault((process.name, process.num_starts), Life(status.deputy, process.command))
-            life.cpu_s, life.max_rss_mb = max(life.cpu_s, process.cpu_s), max(life.max_rss_mb, process.rss_mb)
-            life.reason = process.reason
+            start = (process.name, process.num_starts)
+            usage = self._usages.setdefault(start, ProcessUsage(status.deputy, process.command))
+            usage.cpu_s = max(usage.cpu_s, process.cpu_s)
+            usage.max_rss_mb = max(usage.max_rss_mb, process.rss_mb)
+            usage.reason = process.reason
             if process.command == "camera" and self._camera_at is None:
                 self._camera_at = time.monotonic() - process.up_s
             if process.command == "evaluator" and process.state == procman_process_t.FINISHED:
                 self._evaluator = status
 
-    def sum_up(self) -> str:
-        """Writes settings.yaml, summary.json, trajectory.png and report.html into the run's folder if it is on this machine.
+    def sum_up(self, present: Present) -> str:
+        """Writes settings.yaml and summary.json, and presents the run, if its folder is on this machine.
 
-        Returns what to tell: the result, or how to get it; empty if no evaluator has finished.
+        Returns what to print: the result, or how to get it; empty if no evaluator has finished.
         """
-        folder = self._values["evaluator"]["out_dir"]
-        if self._evaluator is None or not folder:
+        out_dir = self._values["evaluator"]["out_dir"]
+        if self._evaluator is None or not out_dir:
             return ""
         if self._evaluator.host != os.uname().nodename:
             return (
-                f"the run is in {folder} on {self._evaluator.host}; there, procman/tessera evaluate {folder} --report FILE.html "
-                "makes a report of it"
+                f"the run is in {out_dir} on {self._evaluator.host}; "
+                f"to make a report there: procman/tessera evaluate {out_dir} --report FILE.html"
             )
-        from tessera_cli.runs.summary import in_words, write_summary
+        folder = Path(out_dir)
+        write_settings(self._assignments, folder / "settings.yaml")
+        return present(write_summary(folder, self._run_facts(folder), self._process_facts()), folder)
 
-        settings.write_settings(self._assignments, Path(folder) / "settings.yaml")
-        return in_words(write_summary(Path(folder), self._run_facts(Path(folder)), self._process_facts()), Path(folder))
-
-    def _run_facts(self, folder: Path):
-        from tessera_cli.runs.summary import RunFacts
-
+    def _run_facts(self, folder: Path) -> RunFacts:
+        extractors = {name for (name, _), usage in self._usages.items() if usage.command == "extractor"}
         return RunFacts(
             source=self._values["camera"]["source"],
             sensor=self._values["camera"]["sensor"],
+            extractors=len(extractors),
             tiles=self._values["dispatcher"]["tiles"],
-            extractors=len({name for (name, _), life in self._lives.items() if life.command == "extractor"}),
             wall_s=self._wall_s(folder),
             ended="complete",
-            messages_undecodable=sum(status.num_undecodable for status in self._view.statuses.values()),
+            messages_undecodable=sum(report.undecodable for report in self._monitor.reports.values()),
         )
 
     def _wall_s(self, folder: Path) -> float:
-        """From the camera's start to the last pose; of a run that had all its poses before the script began, between its poses."""
-        import numpy as np
-
-        from tessera_cli.runs.run_folder import read_frames
-
-        if (last_pose_at := self._view.progress.last_pose_at) and self._camera_at:
+        """From the camera's start to the last pose; between the poses if all came before the script began."""
+        if (last_pose_at := self._monitor.progress.last_pose_at) and self._camera_at:
             return max(0.0, last_pose_at - self._camera_at)
         frames = read_frames(folder / "frames.csv")
         return float(np.nansum(frames.pose_time_ms)) / 1000 if frames else 0.0
 
-    def _process_facts(self):
-        from tessera_cli.runs.summary import ProcessFacts
-
+    def _process_facts(self) -> ProcessFacts:
         cpu_s: dict[str, float] = {}
         max_rss_mb: dict[str, float] = {}
-        restarts: list[tuple[str, Life]] = []
-        for (name, number), life in sorted(self._lives.items()):
-            cpu_s[name] = cpu_s.get(name, 0.0) + life.cpu_s
-            max_rss_mb[name] = max(max_rss_mb.get(name, 0.0), life.max_rss_mb)
-            if number > self._earlier[name] + 1:
-                restarts.append((name, life))
+        restarts: list[tuple[str, ProcessUsage]] = []
+        for (name, number), usage in sorted(self._usages.items(), key=lambda item: item[0]):
+            cpu_s[name] = cpu_s.get(name, 0.0) + usage.cpu_s
+            max_rss_mb[name] = max(max_rss_mb.get(name, 0.0), usage.max_rss_mb)
+            if number > self._earlier_starts[name] + 1:
+                restarts.append((name, usage))
         return ProcessFacts(
-            cpu_s,
-            max_rss_mb,
-            sum(life.command == "extractor" for _, life in restarts),
-            [
-                f"{name} on {life.deputy} was started again: it {life.reason or 'was asked to'}"
-                for name, life in restarts
+            cpu_s=cpu_s,
+            max_rss_mb=max_rss_mb,
+            num_extractor_restarts=sum(usage.command == "extractor" for _, usage in restarts),
+            warnings=[
+                f"{name} on {usage.deputy} was restarted: it {usage.reason or 'was ordered to restart'}"
+                for name, usage in restarts
             ],
         )

@@ -1,4 +1,4 @@
-"""SOURCE on the command line: what kind it is, whether it is there, and what the camera process is told."""
+"""SOURCE on the command line: its kind, whether it exists, and how the camera process gets it."""
 
 import re
 from dataclasses import dataclass
@@ -12,8 +12,10 @@ FILES = ("video", "log")
 
 @dataclass(frozen=True)
 class Source:
+    """Where frames come from."""
+
     kind: str  # kitti, euroc, tum, video, log, camera, rtsp, sim, bus
-    text: str  # as the camera process takes it, with an absolute path; for bus: the URL, empty for the main bus
+    text: str  # as the camera process gets it, with an absolute path; for bus: the URL, empty for the main bus
     name: str  # short, for the run's folder
 
     @property
@@ -27,6 +29,7 @@ class Source:
 
 
 def parse_source(text: str) -> Source:
+    """Raises UserError if the source is malformed or does not exist."""
     kind, colon, rest = text.partition(":")
     if not colon:
         raise UserError(

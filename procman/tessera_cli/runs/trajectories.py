@@ -1,10 +1,11 @@
 """Trajectory files, and the error of one against another by the evo package.
 
-Positions are metres (mono: map units), rotations unit quaternions x y z w, both of the camera in the world.
+Positions are meters (mono: map units), rotations unit quaternions x y z w, both of the camera in the world.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +13,14 @@ from tessera_cli.errors import UserError
 
 # Poses of the two files belong together if their times differ by at most this.
 MAX_TIME_DIFFERENCE_S = 0.02
-# Fewer poses than this don't fix an alignment.
+# Fewer poses than this don't determine an alignment.
 MIN_POSES = 3
 
 
 @dataclass(frozen=True)
 class Trajectory:
+    """Poses of the camera in the world, in order of time."""
+
     timestamps_s: np.ndarray  # n; of a KITTI file: the row's number
     positions: np.ndarray  # n x 3
     quaternions_xyzw: np.ndarray  # n x 4
@@ -29,14 +32,14 @@ class TrajectoryError:
     """Absolute trajectory error after the best alignment of the estimate to the truth."""
 
     timestamps_s: np.ndarray  # n, of the poses that have a truth
-    estimate: np.ndarray  # n x 3, aligned, metres
-    truth: np.ndarray  # n x 3, metres
+    estimate: np.ndarray  # n x 3, aligned, meters
+    truth: np.ndarray  # n x 3, meters
     errors_m: np.ndarray  # n
     scale: float  # that the estimate was multiplied by
     alignment: str
     rotation: np.ndarray  # 3 x 3, truth_from_estimate
-    translation: np.ndarray  # 3, metres
-    num_estimated: int  # poses of the estimate, with a truth or without
+    translation: np.ndarray  # 3, meters
+    num_estimated: int  # poses of the estimate, with or without a truth
 
     @property
     def rms_m(self) -> float:
@@ -97,9 +100,8 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
     if estimate.has_times != truth.has_times:
         raise UserError("one trajectory has timestamps and the other has none: give two TUM files or two KITTI files.")
     if not estimate.has_times and len(estimate.positions) != len(truth.positions):
-        raise UserError(
-            f"KITTI files go together by row, but one has {len(estimate.positions)} rows and the other {len(truth.positions)}."
-        )
+        rows = f"one has {len(estimate.positions)} rows and the other {len(truth.positions)}"
+        raise UserError(f"KITTI files go together by row, but {rows}.")
     try:
         true_path, estimated_path = sync.associate_trajectories(
             _to_evo(truth), _to_evo(estimate), max_diff=MAX_TIME_DIFFERENCE_S
@@ -112,27 +114,27 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
         rotation, translation, scale = estimated_path.align(true_path, correct_scale=with_scale)
     except GeometryException as error:
         raise UserError("the poses don't determine an alignment: the camera stood still or moved on a line.") from error
-    error = metrics.APE(metrics.PoseRelation.translation_part)
-    error.process_data((true_path, estimated_path))
+    position_error = metrics.APE(metrics.PoseRelation.translation_part)
+    position_error.process_data((true_path, estimated_path))
     return TrajectoryError(
-        np.asarray(true_path.timestamps),
-        estimated_path.positions_xyz,
-        true_path.positions_xyz,
-        np.asarray(error.error),
-        float(scale),
-        "Sim(3)" if with_scale else "SE(3)",
-        rotation,
-        translation,
-        len(estimate.positions),
+        timestamps_s=np.asarray(true_path.timestamps),
+        estimate=estimated_path.positions_xyz,
+        truth=true_path.positions_xyz,
+        errors_m=np.asarray(position_error.error),
+        scale=float(scale),
+        alignment="Sim(3)" if with_scale else "SE(3)",
+        rotation=rotation,
+        translation=translation,
+        num_estimated=len(estimate.positions),
     )
 
 
 def length_m(positions: np.ndarray) -> float:
-    """Of the way from the first of n x 3 positions to the last."""
+    """Of the path through n x 3 positions."""
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
 
-def _to_evo(trajectory: Trajectory):
+def _to_evo(trajectory: Trajectory) -> Any:
     from evo.core.trajectory import PoseTrajectory3D
 
     return PoseTrajectory3D(

@@ -1,42 +1,45 @@
-"""tessera up: starts the processes of a list on their nodes, or carries out a script of it. Other lists are left alone."""
+"""tessera up: starts the processes of a list on their nodes, or carries out one of its scripts."""
 
 import tempfile
 import time
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
-from tessera_cli import settings
+from tessera_cli.console import say
 from tessera_cli.errors import UserError
-from tessera_cli.lcm_bus import ttl_of
-from tessera_cli.runs.script_summary import ScriptRun
+from tessera_cli.files import absolute
+from tessera_cli.lcm_bus import is_on_lan
+from tessera_cli.runs.script_summary import ScriptWatcher
+from tessera_cli.runs.summary import Present
+from tessera_cli.settings import Settings, network_assignments, write_settings
 from tessera_cli.supervision.process_list import ProcessList, read_process_list
-from tessera_cli.supervision.process_names import LIST
+from tessera_cli.supervision.process_names import LIST_NAME
 from tessera_cli.supervision.script_runner import ScriptRunner
 from tessera_cli.supervision.sheriff import Sheriff
-from tessera_cli.supervision.sheriff_commands import say
 
 
-def main(arguments: Namespace) -> int:
+def up(arguments: Namespace, present: Present) -> int:
+    """`present` says what is printed about a run that a script carried out. Other lists are left alone."""
     process_list = read_process_list(Path(arguments.file), dict(arguments.counts))
     if arguments.script and arguments.script not in process_list.scripts:
-        raise UserError(
-            f"{arguments.file} has no script '{arguments.script}'; it has: {', '.join(process_list.scripts) or 'none'}."
-        )
+        known = ", ".join(process_list.scripts) or "none"
+        raise UserError(f"{arguments.file} has no script '{arguments.script}'; it has: {known}.")
     name = _name(arguments)
     assignments = _assignments(process_list, arguments)
-    values = _check(assignments)
+    values = _merge(assignments)
     sheriff = Sheriff(arguments)
     runner = ScriptRunner(sheriff, name, process_list, assignments, say)
     sheriff.require_deputies(runner.hosts)
-    sheriff.meet()
+    sheriff.discover_deputies()
     _refuse_clash(sheriff, name, process_list, values["bus"])
-    runner.leave_other_hosts()
+    runner.end_on_other_hosts()
     began = time.monotonic()
     if arguments.script:
-        run = ScriptRun(sheriff, name, assignments, values)
-        runner.carry_out(arguments.script)
+        watcher = ScriptWatcher(sheriff, name, assignments, values)
+        runner.run(arguments.script)
         say(f"script {arguments.script} ended well after {time.monotonic() - began:.1f} s")
-        if words := run.sum_up():
+        if words := watcher.sum_up(present):
             print(words)
         return 0
     names = list(process_list.processes)
@@ -48,37 +51,34 @@ def main(arguments: Namespace) -> int:
 
 def _name(arguments: Namespace) -> str:
     name = arguments.name or Path(arguments.file).stem
-    if not LIST.fullmatch(name):
-        raise UserError(
-            f"'{name}' can't be a list's name, which has letters, digits, _ . and -, at most 48: give --name NAME."
-        )
+    if not LIST_NAME.fullmatch(name):
+        rule = "a list's name has letters, digits, _ . and -, at most 48"
+        raise UserError(f"'{name}' can't be used: {rule}; give --name NAME.")
     return name
 
 
 def _assignments(process_list: ProcessList, arguments: Namespace) -> list[str]:
     """All settings of the run that differ from the defaults."""
-    make = settings.lan_assignments if ttl_of(arguments) else settings.port_assignments
-    assignments = make(arguments.port) + process_list.settings
+    assignments = network_assignments(arguments.port, is_on_lan(arguments)) + process_list.settings
     if arguments.out:
-        assignments.append(f"evaluator.out_dir={Path(arguments.out).expanduser().absolute()}")
+        assignments.append(f"evaluator.out_dir={absolute(arguments.out)}")
     return assignments + arguments.settings
 
 
-def _check(assignments: list[str]) -> dict:
-    """All settings as sections of keys. Raises UserError if one is at fault."""
+def _merge(assignments: list[str]) -> Settings:
+    """All settings. Raises UserError if one is wrong."""
     with tempfile.TemporaryDirectory() as folder:
-        return settings.write_settings(assignments, Path(folder) / "settings.yaml")
+        return write_settings(assignments, Path(folder) / "settings.yaml")
 
 
-def _refuse_clash(sheriff: Sheriff, name: str, process_list: ProcessList, bus: dict) -> None:
-    """Two stages of one name on one bus, under one prefix, would answer each other's messages."""
+def _refuse_clash(sheriff: Sheriff, name: str, process_list: ProcessList, bus: dict[str, Any]) -> None:
+    """Two stages of one name on one bus, with the same prefix, would answer each other's messages."""
     stages = {process.name for process in process_list.processes.values() if process.options.ready == "status"}
-    for heard in sheriff.deputies.values():
-        for each in heard.status.lists:
-            if each.name == name or (each.main_url, each.channel_prefix) != (bus["main_url"], bus["channel_prefix"]):
-                continue
-            if common := [process.name for process in each.processes if process.pid and process.name in stages]:
-                raise UserError(
-                    f"the list {each.name} has a '{common[0]}' on the same bus: end it (procman/tessera down {each.name}), or give "
-                    f"this one channels of its own: --set bus.channel_prefix={name.upper()}_"
-                )
+    for each in [each for deputy in sheriff.deputies.values() for each in deputy.status.lists]:
+        if each.name == name or (each.main_url, each.channel_prefix) != (bus["main_url"], bus["channel_prefix"]):
+            continue
+        if common := [process.name for process in each.processes if process.pid and process.name in stages]:
+            raise UserError(
+                f"the list {each.name} has a '{common[0]}' on the same bus: end it (procman/tessera down {each.name}), "
+                f"or give this list channels of its own: --set bus.channel_prefix={name.upper()}_"
+            )

@@ -1,4 +1,4 @@
-"""One running process of a deputy: started with its limits, its output read, accounted by the kernel, its whole tree ended."""
+"""One running process of a deputy: its start with limits, its output, its usage, and its end with all descendants."""
 
 import ctypes
 import os
@@ -7,6 +7,7 @@ import signal
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from tessera_cli.supervision.attributes import RunOptions
 from tessera_cli.supervision.process_tree import MARK, kill_marked, marked
@@ -18,20 +19,20 @@ READ_BYTES = 65536
 
 @dataclass(frozen=True)
 class Launch:
-    """What is executed; two equal ones need no new process."""
+    """What is executed. A process is restarted when it is wanted with another Launch than it runs with."""
 
-    words: tuple[str, ...]
+    words: tuple[str, ...]  # program and arguments
     folder: Path
     environment: tuple[tuple[str, str], ...]
     command: str
     depends: tuple[str, ...]
     options: RunOptions
     run: str  # digest of the settings
-    generation: int  # another one, another process
+    generation: int  # counts ordered restarts
 
 
 def describe_exit(status: int) -> str:
-    """As `Child.poll` tells it."""
+    """`status` as returned by ChildProcess.poll; the words continue a sentence that begins with the process's name."""
     if status >= 0:
         return f"ended with status {status}"
     try:
@@ -41,7 +42,7 @@ def describe_exit(status: int) -> str:
 
 
 def _prepare(parent: int, options: RunOptions) -> None:
-    """Runs in the child before exec: the kernel kills it when `parent` is gone, however that went."""
+    """Runs in the child before exec. The kernel kills the child as soon as `parent` has died, for whatever reason."""
     _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
@@ -51,7 +52,9 @@ def _prepare(parent: int, options: RunOptions) -> None:
         os.sched_setaffinity(0, options.cpus)
 
 
-class Child:
+class ChildProcess:
+    """A process, from its start to the end of the last of its descendants."""
+
     def __init__(self, launch: Launch, mark: str) -> None:
         """Raises OSError or subprocess.SubprocessError (a nice value or CPU that the kernel refuses)."""
         parent = os.getpid()
@@ -66,40 +69,42 @@ class Child:
             start_new_session=True,
             preexec_fn=lambda: _prepare(parent, launch.options),
         )
-        os.set_blocking(self._popen.stdout.fileno(), False)
+        assert self._popen.stdout is not None
+        self._output: IO[bytes] = self._popen.stdout
+        os.set_blocking(self._output.fileno(), False)
         self.pid = self._popen.pid
-        self.may_say_more = True  # until it and all its descendants have closed their output
+        self.has_open_output = True  # until it and all its descendants have closed it
         self.cpu_s = 0.0  # of itself and of descendants that it waited for; known when it has ended
         self.max_rss_mb = 0.0  # its own peak, 10^6 bytes
         self._status: int | None = None
 
     def fileno(self) -> int:
-        return self._popen.stdout.fileno()
+        return self._output.fileno()
 
     def read(self) -> bytes:
-        """What it wrote since; empty if nothing."""
+        """What it has written since the last call; empty if nothing."""
         try:
             data = os.read(self.fileno(), READ_BYTES)
         except BlockingIOError:
             return b""
-        self.may_say_more = bool(data)
+        self.has_open_output = bool(data)
         return data
 
     def poll(self) -> int | None:
         """Exit status, negative: by that signal; None while it runs."""
         if self._status is None:
             self._note_peak_memory()
-            self._reap(os.WNOHANG)
+            self._wait(os.WNOHANG)
         return self._status
 
-    def _reap(self, options: int) -> None:
+    def _wait(self, options: int) -> None:
         pid, status, usage = os.wait4(self.pid, options)
         if pid:
             self.cpu_s = usage.ru_utime + usage.ru_stime
             self._status = self._popen.returncode = os.waitstatus_to_exitcode(status)
 
     def _note_peak_memory(self) -> None:
-        """The kernel's high-water mark since exec. (ru_maxrss would begin with what this Python had when it forked.)"""
+        """The kernel's high-water mark since exec. (ru_maxrss starts with what this Python had when it forked.)"""
         try:
             status = Path(f"/proc/{self.pid}/status").read_text()
         except OSError:
@@ -107,8 +112,8 @@ class Child:
         if peak := re.search(r"^VmHWM:\s*(\d+) kB", status, re.MULTILINE):
             self.max_rss_mb = max(self.max_rss_mb, 1024e-6 * int(peak[1]))
 
-    def ask_to_end(self, number: int) -> None:
-        """Its whole group, as a terminal would."""
+    def signal_group(self, number: int) -> None:
+        """To its whole process group, as a terminal does."""
         try:
             os.killpg(self.pid, number)
         except ProcessLookupError:
@@ -117,13 +122,13 @@ class Child:
     def has_descendants(self) -> bool:
         return bool(marked(self._mark))
 
-    def end(self) -> None:
-        """Kills what is left of the tree."""
+    def kill(self) -> None:
+        """Kills what is left of it and its descendants."""
         if self._status is None:
             self._note_peak_memory()
         kill_marked(self._mark)
         if self._status is None:
-            self._reap(0)
+            self._wait(0)
 
     def close(self) -> None:
-        self._popen.stdout.close()
+        self._output.close()

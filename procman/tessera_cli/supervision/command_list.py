@@ -1,8 +1,8 @@
-"""A deputy's own list of what it executes. Orders choose from it by name; nothing else is ever executed.
+"""A deputy's own list of what it executes: orders select from it by name, and nothing else is ever executed.
 
 It has the grammar of process lists, with other attributes: exec (the program and its arguments), folder, environment.
 In exec, ${bin}, ${settings}, ${name} and ${id} stand for the folder of the built programs, the run's file of settings,
-and the process's name and number. Words are split before that, so that no value can become two arguments.
+and the process's name and number. Words are split before they are filled in, so that no value becomes two arguments.
 """
 
 import re
@@ -11,29 +11,35 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tessera_cli.errors import UserError
-from tessera_cli.files import ROOT
+from tessera_cli.files import PROCMAN, ROOT
 from tessera_cli.supervision.attributes import read_attributes
-from tessera_cli.supervision.pmd_syntax import Block, read_blocks
+from tessera_cli.supervision.pmd_syntax import Block, read_blocks, refuse
 from tessera_cli.supervision.process_list import require_name
 
+SHIPPED_LIST = PROCMAN / "commands.pmd"
 PLACEHOLDER = re.compile(r"\$\{([^}]*)\}")
 PLACEHOLDERS = ("bin", "settings", "name", "id")
 
 
 @dataclass(frozen=True)
 class LocalCommand:
+    """One entry of the list."""
+
     name: str
     words: tuple[str, ...]  # program and arguments, with placeholders
     folder: Path  # working folder
     environment: dict[str, str] = field(default_factory=dict)  # added to the deputy's own
 
     def fill(self, values: dict[str, str]) -> list[str]:
-        """The words to execute."""
+        """The words to execute. `values`: of all placeholders."""
         return [PLACEHOLDER.sub(lambda match: values[match[1]], word) for word in self.words]
 
 
 def read_command_list(path: Path, folder: Path = ROOT) -> dict[str, LocalCommand]:
-    """`folder`: where commands work for which the list says none. Raises UserError with file, line and column of the first fault."""
+    """The commands by name. `folder`: working folder of commands for which the list names none.
+
+    Raises UserError with file, line and column of the first error.
+    """
     commands: dict[str, LocalCommand] = {}
     for block in read_blocks(path):
         command = _read_command(block, folder)
@@ -48,9 +54,9 @@ def read_command_list(path: Path, folder: Path = ROOT) -> dict[str, LocalCommand
 def _read_command(block: Block, folder: Path) -> LocalCommand:
     if block.kind != "cmd":
         raise block.place.error(f"a command list holds only cmd, not '{block.kind}'.")
-    for inner in block.blocks + block.steps:
-        raise inner.place.error('a cmd holds only attributes such as exec = "PROGRAM ARGUMENTS";.')
-    values = read_attributes(block, {"exec": _read_words, "folder": _read_folder, "environment": _read_environment})
+    refuse([*block.blocks, *block.steps], 'a cmd holds only attributes such as exec = "PROGRAM ARGUMENTS";.')
+    readers = {"exec": _read_words, "folder": _read_folder, "environment": _read_environment}
+    values = read_attributes(block, readers)
     if "exec" not in values:
         raise block.place.error(f'cmd "{block.name}" has no exec.')
     words = values.pop("exec")
@@ -75,5 +81,5 @@ def _read_folder(text: str) -> Path:
 def _read_environment(text: str) -> dict[str, str]:
     pairs = [word.partition("=") for word in shlex.split(text)]
     if not all(re.fullmatch(r"[A-Za-z_]\w*", name) and equals for name, equals, _ in pairs):
-        raise ValueError("must be NAME=VALUE with blanks between them")
+        raise ValueError("must be NAME=VALUE, separated by blanks")
     return {name: value for name, _, value in pairs}

@@ -1,7 +1,7 @@
-"""Ends what a deputy leaves when it dies, however that went.
+"""Ends what a deputy leaves behind when it dies, for whatever reason.
 
-The guard is a process of its own: python -m tessera_cli.supervision.guard MARK. It waits until its standard input is closed,
-whose other end the deputy holds: the kernel closes it when the deputy dies.
+The guard is a process of its own: python -m tessera_cli.supervision.guard MARK. It waits until its standard input is
+closed, whose other end the deputy holds: the kernel closes it when the deputy dies.
 """
 
 import os
@@ -9,42 +9,43 @@ import signal
 import subprocess
 import sys
 
-from tessera_cli.errors import RunFailed
-from tessera_cli.files import ROOT
+from tessera_cli.errors import RunError
+from tessera_cli.files import PROCMAN
 from tessera_cli.supervision.process_tree import kill_marked
 
 
 class Guard:
-    """The deputy's side."""
+    """The deputy's side of its guard process."""
 
     def __init__(self, mark: str) -> None:
-        """`mark`: what the marks of all its processes begin with. Those of an earlier deputy are ended now."""
+        """`mark`: the beginning of the marks of all its processes. Those of an earlier deputy are killed now."""
         if not kill_marked(mark):
-            raise RunFailed("processes of an earlier deputy of this folder can't be ended.")
+            raise RunError("processes of an earlier deputy of this folder can't be ended.")
         self._mark = mark
         self._process = self._start()
 
-    def _start(self) -> subprocess.Popen:
+    def _start(self) -> "subprocess.Popen[bytes]":
         return subprocess.Popen(
             [sys.executable, "-m", "tessera_cli.supervision.guard", self._mark],
             stdin=subprocess.PIPE,
             start_new_session=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT / "procman")},
+            env={**os.environ, "PYTHONPATH": str(PROCMAN)},
         )
 
     def watch(self) -> None:
-        """Starts another guard if somebody has ended this one."""
+        """Starts another guard if this one was ended."""
         if self._process.poll() is not None:
             self._process = self._start()
 
     def end(self) -> int:
-        """Its exit status; 0: nothing is left."""
+        """Its exit status; 0: no process is left."""
+        assert self._process.stdin is not None
         self._process.stdin.close()
         return self._process.wait()
 
 
 def main() -> int:
-    # Who ends the deputy's whole group must not end the guard before its work.
+    # A signal to the deputy's whole group must not end the guard before its work is done.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     while os.read(0, 4096):

@@ -1,49 +1,44 @@
-"""What a process says, kept on its node: one file and a few older ones."""
+"""The log of one process on its node: the newest file and a few older ones, rotated by logging.handlers."""
 
-import os
+import logging
+from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
-MAX_BYTES = 10_000_000
-NUM_OLD = 3
+from tessera_cli.constants import LOG_FILE_BYTES, NUM_OLD_LOG_FILES
+
+# Of each file, what is read to find its last lines.
+TAIL_BYTES = 1_000_000
 
 
-class RotatingLog:
-    """`path` is the newest; path.1, path.2, ... are older. Appends to what an earlier deputy wrote."""
+class ProcessLog:
+    """`path` is the newest file; path.1, path.2, ... are older. Appends to what an earlier deputy wrote."""
 
-    def __init__(self, path: Path, max_bytes: int = MAX_BYTES, num_old: int = NUM_OLD) -> None:
+    def __init__(self, path: Path, max_bytes: int = LOG_FILE_BYTES, num_old: int = NUM_OLD_LOG_FILES) -> None:
         self.path = path
-        self._max_bytes, self._num_old = max_bytes, num_old
-        path.parent.mkdir(parents=True, exist_ok=True)  # that of its list
-        self._file = open(path, "ab")
+        path.parent.mkdir(parents=True, exist_ok=True)  # the folder of its list
+        # Bytes pass through unchanged: what is not UTF-8 is escaped on the way in and unescaped on the way out.
+        self._handler = _LogHandler(
+            path, maxBytes=max_bytes, backupCount=num_old, encoding="utf-8", errors="surrogateescape"
+        )
+        self._handler.terminator = ""  # the output of a process brings its own line ends
 
     def write(self, data: bytes) -> None:
-        """A full disk must not end what is being logged: then the data is lost."""
-        try:
-            self._file.write(data)
-            self._file.flush()
-            if self._file.tell() > self._max_bytes:
-                self._rotate()
-        except OSError:
-            pass
-
-    def _rotate(self) -> None:
-        self._file.close()
-        for age in range(self._num_old, 0, -1):
-            newer = self._old(age - 1)
-            if newer.exists():
-                os.replace(newer, self._old(age))
-        self._file = open(self.path, "ab")
-
-    def _old(self, age: int) -> Path:
-        return self.path.with_name(f"{self.path.name}.{age}") if age else self.path
+        """Data is lost if it can't be written: a full disk must not end the process that is logged."""
+        text = data.decode(errors="surrogateescape")
+        self._handler.emit(logging.LogRecord("", logging.INFO, "", 0, text, None, None))
 
     def tail(self, num_lines: int) -> str:
-        """The last whole lines, of the newest file and the one before."""
-        text = b""
-        for path in (self._old(1), self.path):
+        """The last lines, of the newest file and the one before."""
+        data = b""
+        for path in (self.path.with_name(f"{self.path.name}.1"), self.path):
             if path.exists():
-                text += path.read_bytes()[-1_000_000:]
-        return "".join(line + "\n" for line in text.decode(errors="replace").splitlines()[-num_lines:])
+                data += path.read_bytes()[-TAIL_BYTES:]
+        return "".join(line + "\n" for line in data.decode(errors="replace").splitlines()[-num_lines:])
 
     def close(self) -> None:
-        self._file.close()
+        self._handler.close()
+
+
+class _LogHandler(RotatingFileHandler):
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802, logging's own name
+        """Does nothing, where logging would print a traceback for each lost line."""

@@ -1,33 +1,50 @@
-"""The grammar of .pmd files, that of libbot's procman, read into a tree. What the names mean is decided elsewhere.
+"""The grammar of .pmd files, that of libbot's procman, parsed into a tree by lark.
 
-  file      := { block }
-  block     := WORD [ STRING ] "{" { block | attribute | step } "}"
-  attribute := WORD "=" ( STRING | WORD ) ";"
-  step      := { WORD | STRING } ";"
-
-"#" begins a comment. Every node of the tree knows its line and column, so that whoever finds a fault can say where.
+What the names in the tree mean is decided by process_list.py and command_list.py. Every node knows its line and column,
+so that whoever finds an error can say where it is.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
+from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedInput, UnexpectedToken, v_args
+
+from tessera_cli.constants import MAX_LIST_BYTES
 from tessera_cli.errors import UserError
 
-# A process list of a hundred nodes is some tens of kilobytes; more is not a process list.
-MAX_FILE_BYTES = 1_000_000
+GRAMMAR = r"""
+    start: block*
+    block: WORD STRING? "{" (block | attribute | step)* "}"
+    attribute: WORD "=" (STRING | WORD) ";"
+    step: WORD (WORD | STRING)* ";"
+
+    STRING: /"(?:[^"\\\n]|\\["\\])*"/
+    WORD: /[A-Za-z0-9_.:\/+-]+/
+    COMMENT: /#[^\n]*/
+    BLANK: /[ \t\r\n]+/
+    %ignore COMMENT
+    %ignore BLANK
+"""
 MAX_DEPTH = 20
-TOKEN = re.compile(
-    r"""(?P<blank>[ \t\r\n]+|\#[^\n]*)
-                     |(?P<string>"(?:[^"\\\n]|\\["\\])*")
-                     |(?P<word>[A-Za-z0-9_.:/+-]+)
-                     |(?P<mark>[{}=;])""",
-    re.VERBOSE,
-)
+# Lark's names of the tokens that may be expected, for people.
+TOKEN_NAMES = {
+    "WORD": "a name",
+    "STRING": "a text in quotes",
+    "LBRACE": "'{'",
+    "RBRACE": "'}'",
+    "EQUAL": "'='",
+    "SEMICOLON": "';'",
+    "$END": "the end of the file",
+}
 
 
 @dataclass(frozen=True)
 class Place:
+    """A position in a file; lines and columns are counted from 1."""
+
     path: Path
     line: int
     column: int
@@ -37,17 +54,17 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Token:
-    kind: str  # string, word, mark or end
-    text: str  # of a string: without quotes and escapes
-    place: Place
+class Word:
+    """A word or a text in quotes, without the quotes."""
 
-    def __str__(self) -> str:
-        return "the end of the file" if self.kind == "end" else f"'{self.text}'"
+    text: str
+    place: Place
 
 
 @dataclass(frozen=True)
 class Attribute:
+    """NAME = VALUE;"""
+
     name: str
     value: str
     place: Place
@@ -55,125 +72,119 @@ class Attribute:
 
 @dataclass(frozen=True)
 class Step:
-    words: list[Token]
+    """WORD WORD ...;"""
+
+    words: list[Word]
     place: Place
 
 
 @dataclass
 class Block:
+    """KIND "NAME" { ... }; the name may be empty."""
+
     kind: str
     name: str
     place: Place
     blocks: list["Block"] = field(default_factory=list)
     attributes: list[Attribute] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
+    depth: int = 1  # 1 + that of the deepest block within
+
+
+class Placed(Protocol):
+    """Any node of the tree."""
+
+    @property
+    def place(self) -> Place: ...
+
+
+def refuse(nodes: Sequence[Placed], sentence: str) -> None:
+    """Raises UserError at the first of these nodes, if there is any."""
+    if nodes:
+        raise nodes[0].place.error(sentence)
 
 
 def read_blocks(path: Path) -> list[Block]:
-    """The outermost blocks of a file. Raises UserError with file, line and column of the first fault."""
+    """The outermost blocks of a file. Raises UserError with file, line and column of the first error."""
+    text = _read_text(path)
+    try:
+        blocks: list[Block] = Lark(GRAMMAR, parser="lalr", transformer=_TreeBuilder(path)).parse(text)  # type: ignore[assignment]
+    except UnexpectedInput as error:
+        raise _explain(error, text, path) from error
+    for block in blocks:
+        if block.depth > MAX_DEPTH:
+            raise block.place.error(f"blocks are nested deeper than {MAX_DEPTH}.")
+    return blocks
+
+
+def _read_text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
         raise UserError(f"the process list {path} can't be read: {error.strerror}.") from error
-    if len(data) > MAX_FILE_BYTES:
-        raise UserError(f"{path} has {len(data)} bytes; that is no process list.")
+    if len(data) > MAX_LIST_BYTES:
+        raise UserError(f"{path} has {len(data)} bytes, which is too large for a process list.")
     try:
-        text = data.decode()
+        return data.decode()
     except UnicodeDecodeError as error:
-        raise UserError(f"{path} is no text: byte {error.start} is not UTF-8.") from error
-    return _Parser(_tokens(text, path)).blocks()
+        raise UserError(f"{path} is not a text file: byte {error.start} is not UTF-8.") from error
 
 
-def _tokens(text: str, path: Path) -> list[Token]:
-    tokens, position, line, line_start = [], 0, 1, 0
-    while position < len(text):
-        place = Place(path, line, position - line_start + 1)
-        match = TOKEN.match(text, position)
-        if not match:
-            what = (
-                "this string does not end on its line"
-                if text[position] == '"'
-                else f"'{text[position]}' means nothing here"
-            )
-            raise place.error(f"{what}.")
-        if match.lastgroup == "string":
-            tokens.append(Token("string", re.sub(r'\\(["\\])', r"\1", match[0][1:-1]), place))
-        elif match.lastgroup != "blank":
-            tokens.append(Token(match.lastgroup, match[0], place))
-        if newlines := match[0].count("\n"):
-            line += newlines
-            line_start = position + match[0].rindex("\n") + 1
-        position = match.end()
-    tokens.append(Token("end", "", Place(path, line, position - line_start + 1)))
-    return tokens
+@v_args(inline=True)
+class _TreeBuilder(Transformer[Token, list[Block]]):
+    """Called by the parser with the parts of each rule, the innermost rule first."""
 
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
 
-class _Parser:
-    def __init__(self, tokens: list[Token]) -> None:
-        self._tokens = tokens
-        self._next = 0
+    def start(self, *blocks: Block) -> list[Block]:
+        return list(blocks)
 
-    def blocks(self) -> list[Block]:
-        found = []
-        while self._peek().kind != "end":
-            found.append(self._block(self._take("word", "a block such as cmd, group or script"), depth=1))
-        return found
-
-    def _block(self, kind: Token, depth: int) -> Block:
-        if depth > MAX_DEPTH:
-            raise kind.place.error(f"blocks are nested deeper than {MAX_DEPTH}.")
-        name = self._take("string", "").text if self._peek().kind == "string" else ""
-        self._take_mark("{", f"'{kind.text}' is a block and needs '{{'")
-        block = Block(kind.text, name, kind.place)
-        while not self._at_mark("}"):
-            self._content(block, kind, depth)
-        self._next += 1
+    def block(self, kind: Word, *content: Word | Block | Attribute | Step) -> Block:
+        block = Block(kind.text, "", kind.place)
+        for part in content:
+            match part:
+                case Word():
+                    block.name = part.text
+                case Block():
+                    block.blocks.append(part)
+                case Attribute():
+                    block.attributes.append(part)
+                case Step():
+                    block.steps.append(part)
+        block.depth += max((inner.depth for inner in block.blocks), default=0)
         return block
 
-    def _content(self, block: Block, kind: Token, depth: int) -> None:
-        if self._peek().kind == "end":
-            raise self._peek().place.error(f"'}}' is missing: '{kind.text}' of line {kind.place.line} is still open.")
-        first = self._take("word", "a name")
-        follower = self._tokens[self._next + (self._peek().kind == "string")]
-        if self._at_mark("="):
-            self._next += 1
-            value = self._take_value(first)
-            self._take_mark(";", f"'{first.text} = ...' must end with ';'")
-            block.attributes.append(Attribute(first.text, value.text, first.place))
-        elif follower.kind == "mark" and follower.text == "{":
-            block.blocks.append(self._block(first, depth + 1))
-        else:
-            block.steps.append(self._step(first))
+    def attribute(self, name: Word, value: Word) -> Attribute:
+        return Attribute(name.text, value.text, name.place)
 
-    def _step(self, first: Token) -> Step:
-        words = [first]
-        while self._peek().kind in ("word", "string"):
-            words.append(self._tokens[self._next])
-            self._next += 1
-        self._take_mark(";", f"'{first.text} ...' must end with ';'")
-        return Step(words, first.place)
+    def step(self, *words: Word) -> Step:
+        return Step(list(words), words[0].place)
 
-    def _peek(self) -> Token:
-        return self._tokens[self._next]
+    def WORD(self, token: Token) -> Word:  # noqa: N802, lark calls it by the token's name
+        return Word(str(token), self._place(token))
 
-    def _at_mark(self, text: str) -> bool:
-        return self._peek().kind == "mark" and self._peek().text == text
+    def STRING(self, token: Token) -> Word:  # noqa: N802
+        return Word(re.sub(r'\\(["\\])', r"\1", token[1:-1]), self._place(token))
 
-    def _take(self, kind: str, what: str) -> Token:
-        token = self._peek()
-        if token.kind != kind:
-            raise token.place.error(f"here should stand {what}, not {token}.")
-        self._next += 1
-        return token
+    def _place(self, token: Token) -> Place:
+        return Place(self._path, token.line or 0, token.column or 0)
 
-    def _take_value(self, name: Token) -> Token:
-        token = self._peek()
-        if token.kind not in ("string", "word"):
-            raise token.place.error(f"'{name.text} =' needs a value, not {token}.")
-        self._next += 1
-        return token
 
-    def _take_mark(self, text: str, sentence: str) -> None:
-        if not self._at_mark(text):
-            raise self._peek().place.error(f"{sentence}, not {self._peek()}.")
-        self._next += 1
+def _explain(error: UnexpectedInput, text: str, path: Path) -> UserError:
+    place = Place(path, error.line, error.column)
+    if isinstance(error, UnexpectedCharacters):
+        is_open_string = error.char == '"'
+        return place.error(
+            "this string does not end on its line." if is_open_string else f"'{error.char}' is not allowed here."
+        )
+    assert isinstance(error, UnexpectedToken)
+    if error.token.type == "$END":
+        return _end_of(text, path).error("a block is still open: its '}' is missing.")
+    expected = " or ".join(sorted(TOKEN_NAMES[name] for name in error.accepts or error.expected))
+    return place.error(f"expected {expected}, but found '{error.token}'.")
+
+
+def _end_of(text: str, path: Path) -> Place:
+    return Place(path, text.count("\n") + 1, len(text) - (text.rfind("\n") + 1) + 1)

@@ -1,26 +1,21 @@
 """What a process list (procman/*.pmd) asks for: which commands run on which nodes, how, and in which scripts.
 
-The list names commands; what a name executes is said by each deputy's own command list (command_list.py), so that a
-list, or whoever sends one, can't make a node execute anything else.
+The list names commands; what a name executes is decided by each deputy's own command list (command_list.py), so that
+neither a list nor its sender can make a node execute anything else.
 """
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from tessera_cli.constants import MAX_INSTANCES
 from tessera_cli.errors import UserError
-from tessera_cli.supervision.attributes import (
-    ATTRIBUTES,
-    MAX_INSTANCES,
-    NAME,
-    RunOptions,
-    number,
-    read_attribute,
-    read_attributes,
-)
-from tessera_cli.supervision.pmd_syntax import Attribute, Block, Place, read_blocks
+from tessera_cli.supervision.attributes import ATTRIBUTES, NAME, RunOptions, number, read_attribute, read_attributes
+from tessera_cli.supervision.pmd_syntax import Attribute, Block, Place, Word, read_blocks, refuse
 
 SETTING = re.compile(r"[a-z_]+\.[a-z0-9_]+")
+DEFAULT_WAIT_S = 60.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +32,11 @@ class Process:
 
 @dataclass(frozen=True)
 class ScriptStep:
-    """start, stop, restart: `names`. wait: until `names` are `status`, at most `seconds`; without a status: sleep. run_script: `script`."""
+    """One step of a script.
+
+    start, stop, restart: `names`. wait: until `names` are `status`, at most `seconds`; without a status: sleep.
+    run_script: `script`.
+    """
 
     action: str
     place: Place
@@ -49,6 +48,8 @@ class ScriptStep:
 
 @dataclass
 class ProcessList:
+    """The content of a file."""
+
     path: Path
     processes: dict[str, Process] = field(default_factory=dict)
     settings: list[str] = field(default_factory=list)  # section.key=value
@@ -60,6 +61,7 @@ class ProcessList:
 
 
 def require_name(block: Block) -> str:
+    """The block's name. Raises UserError if it has none or a bad one."""
     if not NAME.fullmatch(block.name):
         raise block.place.error(
             f'{block.kind} needs a name in quotes, of letters, digits and _, at most 48; it has "{block.name}".'
@@ -67,18 +69,20 @@ def require_name(block: Block) -> str:
     return block.name
 
 
-def read_process_list(path: Path, counts: dict[str, int] | None = None) -> ProcessList:
-    """`counts`: of processes on each host, by cmd, instead of what the list says. Raises UserError with file, line and column
-    of the first fault."""
+def read_process_list(path: Path, counts: Mapping[str, int] | None = None) -> ProcessList:
+    """`counts`: number of processes on each host, by cmd, instead of what the list says.
+
+    Raises UserError with file, line and column of the first error.
+    """
     return _Reader(path, counts or {}).read(read_blocks(path))
 
 
 class _Reader:
-    def __init__(self, path: Path, counts: dict[str, int]) -> None:
+    def __init__(self, path: Path, counts: Mapping[str, int]) -> None:
         self._counts = counts
         self._list = ProcessList(path)
         self._members: dict[str, list[str]] = {}  # processes of each cmd and group
-        self._depends: list[tuple[str, Attribute]] = []  # of a cmd, to be resolved when all names are known
+        self._depends: list[tuple[str, Attribute]] = []  # of a cmd, resolved when all names are known
 
     def read(self, blocks: list[Block]) -> ProcessList:
         for block in blocks:
@@ -86,8 +90,8 @@ class _Reader:
                 self._read_settings(block)
             elif block.kind != "script":
                 self._read_member(block)
-        if strangers := sorted(set(self._counts) - {block.name for block in _commands(blocks)}):
-            raise UserError(f'{self._list.path} has no cmd "{strangers[0]}".')
+        if unknown := sorted(set(self._counts) - {block.name for block in _commands(blocks)}):
+            raise UserError(f'{self._list.path} has no cmd "{unknown[0]}".')
         if not self._list.processes:
             raise UserError(f'{self._list.path} lists no process: it needs a block cmd "NAME" {{ ... }}.')
         self._resolve_depends()
@@ -98,11 +102,10 @@ class _Reader:
         return self._list
 
     def _read_settings(self, block: Block) -> None:
-        for inner in block.blocks + block.steps:
-            raise inner.place.error('settings holds only section.key = "value";.')
+        refuse([*block.blocks, *block.steps], 'settings holds only section.key = "value";.')
         for attribute in block.attributes:
             if not SETTING.fullmatch(attribute.name):
-                raise attribute.place.error(f"'{attribute.name}' is no setting; they are named section.key.")
+                raise attribute.place.error(f"'{attribute.name}' is no setting; settings are named section.key.")
             self._list.settings.append(f"{attribute.name}={attribute.value}")
 
     def _read_member(self, block: Block) -> list[str]:
@@ -113,19 +116,17 @@ class _Reader:
         if name in self._members:
             raise block.place.error(f'the name "{name}" is taken by an earlier block.')
         for step in block.steps:
-            raise step.place.error(f"'{step.words[0].text}' belongs into a script.")
+            raise step.place.error(f"'{step.words[0].text}' is only allowed in a script.")
         self._members[name] = []
         self._members[name] = self._read_group(block) if block.kind == "group" else self._read_command(block)
         return self._members[name]
 
     def _read_group(self, block: Block) -> list[str]:
-        for attribute in block.attributes:
-            raise attribute.place.error("a group has no attributes; they belong to its commands.")
+        refuse(block.attributes, "a group has no attributes; they belong to its commands.")
         return [name for inner in block.blocks for name in self._read_member(inner)]
 
     def _read_command(self, block: Block) -> list[str]:
-        for inner in block.blocks:
-            raise inner.place.error("a cmd holds no blocks.")
+        refuse(block.blocks, "a cmd holds no blocks.")
         values = read_attributes(block, ATTRIBUTES)
         hosts, listed_count = values.pop("host", ("",)), values.pop("count", None)
         count = self._counts.get(block.name, 1 if listed_count is None else listed_count)
@@ -142,71 +143,57 @@ class _Reader:
             name = f"{block.name}_{instance}" if is_numbered else block.name
             if name in self._list.processes:
                 raise block.place.error(f'two processes would be named "{name}".')
-            process = Process(name, commands[0], hosts[instance // count], instance, (), RunOptions(**values))
-            self._list.processes[name] = process
+            host = hosts[instance // count]
+            self._list.processes[name] = Process(name, commands[0], host, instance, (), RunOptions(**values))
             names.append(name)
         return names
 
-    def _names(self, name: str, place: Place) -> list[str]:
-        if name in self._members:
-            return self._members[name]
-        if name in self._list.processes:
-            return [name]
-        raise place.error(f'there is no cmd or group "{name}".')
+    def _names(self, word: str, place: Place) -> list[str]:
+        if word in self._members:
+            return self._members[word]
+        if word in self._list.processes:
+            return [word]
+        raise place.error(f'there is no cmd or group "{word}".')
 
     def _resolve_depends(self) -> None:
         depends: dict[str, tuple[str, ...]] = {}
         places: dict[str, Place] = {}
         for command, attribute in self._depends:
-            found = [
-                name for word in read_attribute(attribute, ATTRIBUTES) for name in self._names(word, attribute.place)
-            ]
+            words = read_attribute(attribute, ATTRIBUTES)
+            found = [name for word in words for name in self._names(word, attribute.place)]
             for name in self._members[command]:
                 depends[name] = tuple(dict.fromkeys(found))
                 places[name] = attribute.place
         for name, place in places.items():
-            if circle := _find_circle(name, depends):
-                raise place.error(f"{' depends on '.join(circle)}: none of them could ever start.")
+            if cycle := _find_cycle(name, depends):
+                raise place.error(f"{' depends on '.join(cycle)}: none of them could ever start.")
         for name, names in depends.items():
-            process = self._list.processes[name]
-            self._list.processes[name] = Process(
-                name, process.command, process.host, process.instance, names, process.options
-            )
+            self._list.processes[name] = replace(self._list.processes[name], depends=names)
 
     def _read_script(self, block: Block) -> None:
         name = require_name(block)
         if name in self._list.scripts:
             raise block.place.error(f'there are two scripts "{name}".')
-        for inner in block.blocks + block.attributes:
-            raise inner.place.error('a script holds only steps such as start cmd "NAME";.')
+        refuse([*block.blocks, *block.attributes], 'a script holds only steps such as start cmd "NAME";.')
         self._list.scripts[name] = [self._read_step(step.words, step.place) for step in block.steps]
 
-    def _read_step(self, tokens, place: Place) -> ScriptStep:
-        texts = [token.text for token in tokens]
+    def _read_step(self, words: list[Word], place: Place) -> ScriptStep:
+        texts = [word.text for word in words]
         match texts:
             case ["start" | "stop" | "restart" as action, "cmd" | "group", name]:
-                return ScriptStep(action, place, tuple(self._names(name, tokens[2].place)))
+                return ScriptStep(action, place, tuple(self._names(name, words[2].place)))
             case ["run_script", name]:
                 return ScriptStep("run_script", place, script=name)
             case ["wait", "ms", milliseconds]:
-                return ScriptStep("wait", place, seconds=_read_seconds(milliseconds, tokens[2].place) / 1000)
-            case [
-                "wait",
-                "cmd" | "group",
-                name,
-                "status",
-                "ready" | "running" | "finished" | "stopped" as status,
-                *rest,
-            ]:
-                # libbot's word for what exists is "running"; here a process that merely exists is of no use to anybody.
+                return ScriptStep("wait", place, seconds=_read_number(milliseconds, words[2].place) / 1000)
+            case ["wait", "cmd" | "group", name, "status", "ready" | "running" | "finished" | "stopped" as status, *_]:
+                names = tuple(self._names(name, words[2].place))
+                # libbot's word for a process that exists is "running"; one that merely exists is of no use here.
                 status = "ready" if status == "running" else status
-                if rest and (len(rest) != 2 or rest[0] != "timeout"):
-                    raise tokens[5].place.error(f"'{rest[0]}' should be: timeout SECONDS;.")
-                seconds = _read_seconds(rest[1], tokens[6].place) if rest else 60.0
-                return ScriptStep("wait", place, tuple(self._names(name, tokens[2].place)), status, seconds)
+                return ScriptStep("wait", place, names, status, _read_timeout(words[5:]))
         raise place.error(
-            f'\'{" ".join(texts)}\' is no step; known: start|stop|restart cmd|group "NAME"; wait ms N; wait cmd|group "NAME" '
-            'status "ready|finished|stopped" [timeout SECONDS]; run_script "NAME".'
+            f"'{' '.join(texts)}' is no step; known: start|stop|restart cmd|group \"NAME\"; wait ms N; "
+            'wait cmd|group "NAME" status "ready|finished|stopped" [timeout SECONDS]; run_script "NAME".'
         )
 
     def _check_scripts(self) -> None:
@@ -217,33 +204,42 @@ class _Reader:
                 if step.script and step.script not in self._list.scripts:
                     raise step.place.error(f'there is no script "{step.script}".')
         for name, steps in self._list.scripts.items():
-            if steps and (circle := _find_circle(name, calls)):
-                raise steps[0].place.error(f"script {' runs '.join(circle)}, without end.")
+            if steps and (cycle := _find_cycle(name, calls)):
+                raise steps[0].place.error(f"script {' runs '.join(cycle)}, without end.")
 
 
 def _commands(blocks: list[Block]) -> list[Block]:
-    """Also those in groups."""
+    """All blocks of kind cmd, also those in groups."""
     return [block for block in blocks if block.kind == "cmd"] + [
         inner for block in blocks for inner in _commands(block.blocks)
     ]
 
 
-def _read_seconds(text: str, place: Place) -> float:
+def _read_timeout(words: list[Word]) -> float:
+    """Of `timeout SECONDS`, or the default if there are no words."""
+    if not words:
+        return DEFAULT_WAIT_S
+    if len(words) != 2 or words[0].text != "timeout":
+        raise words[0].place.error(f"'{words[0].text}' should be: timeout SECONDS;.")
+    return _read_number(words[1].text, words[1].place)
+
+
+def _read_number(text: str, place: Place) -> float:
     try:
         return number(0, 86_400_000)(text)
     except ValueError as error:
         raise place.error(f"'{text}' {error}.") from error
 
 
-def _find_circle(start: str, edges: dict[str, tuple[str, ...]]) -> list[str]:
-    """Names from `start` back to itself, empty if there is no way."""
-    ways, seen = [[start]], set()
-    while ways:
-        way = ways.pop()
-        for name in edges.get(way[-1], ()):
+def _find_cycle(start: str, edges: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Names along the edges from `start` back to itself, empty if there is no such path."""
+    paths, seen = [[start]], set()
+    while paths:
+        path = paths.pop()
+        for name in edges.get(path[-1], ()):
             if name == start:
-                return way + [name]
+                return [*path, name]
             if name not in seen:
                 seen.add(name)
-                ways.append(way + [name])
+                paths.append([*path, name])
     return []

@@ -1,7 +1,7 @@
-"""Trees of processes: what they use, and how they are ended to the last one.
+"""Trees of processes: what they use, and how they are ended to the last descendant.
 
 Every process that a deputy starts carries a mark in its environment, which its descendants inherit. So they are found
-also when their parents are gone, whatever sessions and groups they made.
+even when their parents are gone, whatever sessions and groups they have created.
 """
 
 import os
@@ -10,12 +10,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from tessera_cli.constants import KILL_TIMEOUT_S
+
 MARK = "TESSERA_PROCESS"  # its value: <deputy's folder>/<process>
-KILL_TIMEOUT_S = 5.0
 
 
 def marked(value: str) -> list[int]:
-    """Processes with this mark; a value that ends in "/" stands for all that begin with it."""
+    """Ids of processes with this mark; a value that ends in "/" stands for all that begin with it."""
     start = os.fsencode(f"\0{MARK}={value}") + (b"" if value.endswith("/") else b"\0")
     found = []
     for name in os.listdir("/proc"):
@@ -30,7 +31,7 @@ def marked(value: str) -> list[int]:
 
 
 def kill_marked(value: str) -> bool:
-    """Kills until none is left, also those that are born meanwhile. False if some can't be killed."""
+    """Kills until none is left, including those that are started meanwhile. False if some can't be killed."""
     deadline = time.monotonic() + KILL_TIMEOUT_S
     while pids := marked(value):
         for pid in pids:
@@ -46,23 +47,23 @@ def kill_marked(value: str) -> bool:
 
 @dataclass
 class Usage:
-    """Of a whole tree."""
+    """Of a process and all its descendants."""
 
     pids: frozenset[int] = frozenset()
-    cpu_percent: float = 0.0  # since the snapshot before; 100 is one core
+    cpu_percent: float = 0.0  # since the last snapshot; 100 is one core
     total_cpu_s: float = 0.0  # of these processes since their starts
     rss_mb: float = 0.0  # 10^6 bytes
 
 
-class Trees:
-    """Reads all processes of the machine once a snapshot."""
+class ProcessTrees:
+    """Measures process trees; reads all processes of the machine once per snapshot."""
 
     def __init__(self) -> None:
         self._cpu_s: dict[int, float] = {}
         self._taken_at = 0.0
 
     def snapshot(self, roots: list[int], now: float) -> dict[int, Usage]:
-        """`now`: monotonic seconds."""
+        """The usage of each tree by its root. `now`: monotonic seconds."""
         import psutil  # late: the guard does without it, and a run starts its processes first
 
         children: dict[int, list[int]] = {}
@@ -76,7 +77,7 @@ class Trees:
         import psutil
 
         pids, rss_bytes, cpu_s, total_cpu_s = [root], 0, 0.0, 0.0
-        for pid in pids:
+        for pid in pids:  # grows while it is walked
             pids += children.get(pid, [])
             try:
                 process = psutil.Process(pid)

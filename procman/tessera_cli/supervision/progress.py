@@ -1,14 +1,16 @@
-"""What the bus has told of a run so far: the state of each stage and how far the poses are."""
+"""What the bus has told about a run so far: the state of each stage, and how far the poses are."""
 
 import time
 from collections import deque
 from dataclasses import dataclass, field
 
-# The frame rate shown is over the last poses only, so that it follows changes.
-RATE_WINDOW_S = 5.0
+from tessera_cli.constants import FRAME_RATE_WINDOW_S
+from tessera_cli.messages import pose_t, stage_status_t
 
-STARTING, RUNNING, FINISHED, FAILED = range(4)
-STATE_NAMES = ("starting", "running", "finished", "failed")
+STARTING, RUNNING = stage_status_t.STARTING, stage_status_t.RUNNING
+FINISHED, FAILED = stage_status_t.FINISHED, stage_status_t.FAILED
+STAGE_STATES = {STARTING: "starting", RUNNING: "running", FINISHED: "finished", FAILED: "failed"}
+TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
 
 
 @dataclass
@@ -30,15 +32,49 @@ class StageReport:
     rss_mb: float
     last_error: str
     values: dict[str, float]
-    heard_at: float  # monotonic seconds
+    received_at: float  # monotonic seconds
 
     @property
     def num_errors(self) -> int:
         return self.lost + self.undecodable
 
 
+def to_report(message: stage_status_t) -> StageReport:
+    return StageReport(
+        name=message.name,
+        host=message.host,
+        pid=message.pid,
+        epoch_us=message.stage_epoch_us,
+        state=message.state,
+        dropped=message.num_dropped,
+        repaired=message.num_repaired,
+        lost=message.num_lost,
+        undecodable=message.num_undecodable,
+        queue=message.queue,
+        step_ms=message.step_median_ms,
+        cpu_percent=message.cpu_percent,
+        rss_mb=message.rss_mb,
+        last_error=message.last_error,
+        values=dict(zip(message.value_names, message.values)),
+        received_at=time.monotonic(),
+    )
+
+
+def is_tracker_pose(pose: pose_t) -> bool:
+    return pose.header.publisher == "tracker" and pose.state in TRACKING_STATES
+
+
+def format_duration(seconds: float | None) -> str:
+    """Minutes and seconds, such as 1:05."""
+    if seconds is None:
+        return "-:--"
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
 @dataclass
 class Progress:
+    """Of one run."""
+
     num_frames: int | None = None  # that the source will send, where known
     num_poses: int = 0
     last_frame: int = -1
@@ -46,16 +82,21 @@ class Progress:
     started_at: float = field(default_factory=time.monotonic)
     last_pose_at: float | None = None  # monotonic seconds
     stages: dict[str, StageReport] = field(default_factory=dict)
-    _recent: deque = field(default_factory=deque)  # (monotonic seconds, number of poses)
+    _recent: deque[tuple[float, int]] = field(default_factory=deque)  # (monotonic seconds, number of poses)
 
-    def add_pose(self, frame: int, state: str) -> None:
+    def add_report(self, report: StageReport) -> None:
+        self.stages[report.name] = report
+        if report.name == "camera" and report.values.get("num_frames", 0) > 0:
+            self.num_frames = int(report.values["num_frames"])
+
+    def add_pose(self, pose: pose_t) -> None:
         now = time.monotonic()
         self.num_poses += 1
-        self.last_frame = max(self.last_frame, frame)
-        self.tracking_state = state
+        self.last_frame = max(self.last_frame, pose.frame)
+        self.tracking_state = TRACKING_STATES[pose.state]
         self.last_pose_at = now
         self._recent.append((now, self.num_poses))
-        while self._recent[0][0] < now - RATE_WINDOW_S:
+        while self._recent[0][0] < now - FRAME_RATE_WINDOW_S:
             self._recent.popleft()
 
     @property
@@ -72,8 +113,13 @@ class Progress:
         return max(0, self.num_frames - self.num_poses) / self.frames_per_s
 
     @property
+    def of_all_frames(self) -> str:
+        """Continues the number of a frame: " of 801", empty if the number of frames is unknown."""
+        return f" of {self.num_frames}" if self.num_frames else ""
+
+    @property
     def num_keyframes(self) -> int:
-        """In the map, as the mapper said last."""
+        """In the map, as last reported by the mapper."""
         return self._of_map("keyframes")
 
     @property
@@ -93,5 +139,5 @@ class Progress:
 
     @property
     def is_finished(self) -> bool:
-        """The evaluator has seen the end of the stream and written its files."""
+        """The evaluator has received the end of the stream and written its files."""
         return "evaluator" in self.stages and self.stages["evaluator"].state == FINISHED

@@ -1,16 +1,19 @@
-"""One process list as a deputy runs it: its settings, and the bus on which its stages say how they are."""
+"""One process list as a deputy runs it: its settings, and the bus on which its stages report."""
 
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tessera_cli.constants import STATUS
 from tessera_cli.lcm_bus import Bus
 from tessera_cli.messages import stage_status_t
-from tessera_cli.supervision.progress import FINISHED, RUNNING
+from tessera_cli.settings import Settings
 
 
 @dataclass(frozen=True)
 class RunningList:
+    """A list and the bus of its stages."""
+
     name: str
     run: str  # digest of the settings
     main_url: str
@@ -19,14 +22,19 @@ class RunningList:
 
 
 def listen_to(
-    name: str, run: str, settings: dict, publisher: str, on_stage: Callable[[str, stage_status_t], None]
+    name: str, run: str, settings: Settings, publisher: str, on_stage: Callable[[str, stage_status_t], None]
 ) -> RunningList:
-    """`on_stage` gets the list's name and each status of a stage of this machine that runs. Raises RunFailed if the bus can't be opened."""
+    """`on_stage` gets the list's name and each status of a running or finished stage of this machine.
+
+    Raises RunError if the bus can't be opened.
+    """
 
     def on_status(status: stage_status_t) -> None:
-        if status.host == os.uname().nodename and RUNNING <= status.state <= FINISHED:
+        is_up = status.state in (stage_status_t.RUNNING, stage_status_t.FINISHED)
+        if status.host == os.uname().nodename and is_up:
             on_stage(name, status)
 
-    bus = Bus(settings["bus"]["main_url"], publisher)
-    bus.subscribe(settings["bus"]["channel_prefix"] + "STATUS", stage_status_t, on_status)
-    return RunningList(name, run, settings["bus"]["main_url"], settings["bus"]["channel_prefix"], bus)
+    main_url, prefix = settings["bus"]["main_url"], settings["bus"]["channel_prefix"]
+    bus = Bus(main_url, publisher)
+    bus.subscribe(prefix + STATUS, stage_status_t, on_status)
+    return RunningList(name, run, main_url, prefix, bus)

@@ -1,33 +1,26 @@
-"""Listens to STATUS and POSE on the main bus, and keeps the Progress of a run."""
+"""Listens to STATUS and POSE of a stack that this command has started, and notices other stacks on the same bus."""
 
 import os
-import select
-import struct
 import time
 from collections.abc import Callable
 
-import lcm
-
-from tessera_cli.errors import RunFailed
-from tessera_cli.messages import heartbeat_t, pose_t, stage_status_t
-from tessera_cli.supervision.progress import FAILED, STARTING, Progress, StageReport
-
-TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
-# Poses come in bursts, and LCM's default of 30 would drop some.
-QUEUE_CAPACITY = 1000
-# A bus without a heartbeat for this long is free.
-FREE_BUS_MS = 250
-# What decoding raises on bytes that make no sense. The stages count them; for a display they are nothing.
-DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError)
+from tessera_cli.constants import FREE_BUS_S, HEARTBEAT, POSE, STATUS
+from tessera_cli.lcm_bus import Bus, listen
+from tessera_cli.messages import decode, heartbeat_t, pose_t, stage_status_t
+from tessera_cli.supervision.progress import STAGE_STATES, Progress, is_tracker_pose, to_report
 
 
-class BusListener:
-    """`owns_pid` tells whether a process of this machine belongs to our stack: others' reports are not ours.
-    `shares_extractors`: extractors that speak here are those of a pool, and no other stack."""
+class StackMonitor:
+    """Keeps the Progress of a run."""
 
     def __init__(
         self, url: str, channel_prefix: str, owns_pid: Callable[[int], bool], shares_extractors: bool = False
     ) -> None:
+        """`owns_pid`: whether a process of this machine belongs to our stack; reports of others are not ours.
+
+        `shares_extractors`: extractors on this bus belong to a pool, not to another stack.
+        Raises RunError if the bus can't be opened.
+        """
         self.progress = Progress()
         self.foreign = ""  # a living process that was on this bus before us
         self.others_heard_at = 0.0  # monotonic seconds: the last status of a process that is not ours
@@ -36,92 +29,46 @@ class BusListener:
         self._shares_extractors = shares_extractors
         self._channel_prefix = channel_prefix
         self._host = os.uname().nodename
-        try:
-            self._lcm = lcm.LCM(url)
-            for channel, handler in (("STATUS", self._on_status), ("POSE", self._on_pose)):
-                self._lcm.subscribe(channel_prefix + channel, handler).set_queue_capacity(QUEUE_CAPACITY)
-        except RuntimeError as error:
-            raise RunFailed(
-                f"the bus {url} can't be opened ({error}): is multicast possible on this machine? Try: "
-                "sudo ip link set lo multicast on; sudo ip route add 224.0.0.0/4 dev lo"
-            ) from error
+        self._bus = Bus(url, "run_monitor")
+        self._bus.subscribe(channel_prefix + STATUS, stage_status_t, self._on_status)
+        self._bus.subscribe(channel_prefix + POSE, pose_t, self._on_pose)
 
-    def listen(self, milliseconds: int) -> None:
-        """Handles what comes within this time."""
-        deadline = time.monotonic() + milliseconds / 1000
-        while (left_s := deadline - time.monotonic()) > 0:
-            # Waiting inside LCM would turn a signal into an error.
-            if select.select([self._lcm.fileno()], [], [], left_s)[0]:
-                self._lcm.handle_timeout(0)
+    def listen(self, seconds: float) -> None:
+        """Handles what arrives within this time."""
+        listen([self._bus], seconds)
 
     def is_free(self) -> bool:
-        """Whether no stack speaks on the bus, which every stage does ten times a second."""
-        heard = []
-        subscription = self._lcm.subscribe(
-            self._channel_prefix + "HEARTBEAT", lambda _channel, data: heard.append(_publisher(data))
-        )
-        self.listen(FREE_BUS_MS)
-        self._lcm.unsubscribe(subscription)
-        return all(self._is_of_pool(name) for name in heard) and not self.foreign
+        """Whether no stack uses the bus. Every stage sends heartbeats, ten a second."""
+        publishers: list[str] = []
+
+        def on_heartbeat(data: bytes) -> None:
+            heartbeat = decode(heartbeat_t, data)
+            publishers.append(heartbeat.header.publisher if heartbeat else "")  # "": a stack of another version
+
+        subscription = self._bus.subscribe(self._channel_prefix + HEARTBEAT, None, on_heartbeat)
+        self.listen(FREE_BUS_S)
+        self._bus.unsubscribe(subscription)
+        return all(self._is_of_pool(name) for name in publishers) and not self.foreign
 
     def _is_of_pool(self, name: str) -> bool:
         return self._shares_extractors and name.startswith("extractor")
 
-    def _on_status(self, _channel: str, data: bytes) -> None:
-        try:
-            message = stage_status_t.decode(data)
-        except DECODE_ERRORS:
+    def _on_status(self, message: stage_status_t) -> None:
+        if message.state not in STAGE_STATES:
             return
-        if not STARTING <= message.state <= FAILED:
-            return
-        report = _to_report(message)
-        if not self._owns_pid(message.pid):
+        is_ours = self._owns_pid(message.pid)
+        if not is_ours:
             self.others_heard_at = time.monotonic()
-        if message.host == self._host and self._owns_pid(message.pid):
-            self.progress.stages[report.name] = report
-            if report.name == "camera" and report.values.get("num_frames", 0) > 0:
-                self.progress.num_frames = int(report.values["num_frames"])
-        elif (
-            message.host == self._host
-            and message.stage_epoch_us < self._began_us
-            and os.path.exists(f"/proc/{message.pid}")
-            and not self._is_of_pool(message.name)
-        ):
+        if message.host != self._host:
+            return
+        if is_ours:
+            self.progress.add_report(to_report(message))
+        elif self._was_here_before(message) and not self._is_of_pool(message.name):
             self.foreign = f"{message.name}, process {message.pid}"
 
-    def _on_pose(self, _channel: str, data: bytes) -> None:
-        try:
-            message = pose_t.decode(data)
-        except DECODE_ERRORS:
-            return
-        if message.header.publisher == "tracker" and message.state in TRACKING_STATES:
-            self.progress.add_pose(message.frame, TRACKING_STATES[message.state])
+    def _was_here_before(self, message: stage_status_t) -> bool:
+        return message.stage_epoch_us < self._began_us and os.path.exists(f"/proc/{message.pid}")
 
-
-def _publisher(data: bytes) -> str:
-    """Of a heartbeat; empty if it makes no sense."""
-    try:
-        return heartbeat_t.decode(data).header.publisher
-    except DECODE_ERRORS:
-        return ""
-
-
-def _to_report(message: stage_status_t) -> StageReport:
-    return StageReport(
-        name=message.name,
-        host=message.host,
-        pid=message.pid,
-        epoch_us=message.stage_epoch_us,
-        state=message.state,
-        dropped=message.num_dropped,
-        repaired=message.num_repaired,
-        lost=message.num_lost,
-        undecodable=message.num_undecodable,
-        queue=message.queue,
-        step_ms=message.step_median_ms,
-        cpu_percent=message.cpu_percent,
-        rss_mb=message.rss_mb,
-        last_error=message.last_error,
-        values=dict(zip(message.value_names, message.values)),
-        heard_at=time.monotonic(),
-    )
+    def _on_pose(self, message: pose_t) -> None:
+        if is_tracker_pose(message):
+            self.progress.add_pose(message)

@@ -1,4 +1,4 @@
-"""A deputy's folder: the logs of its processes; on a node also the last order of each list that it obeyed, and their settings."""
+"""The folder of a deputy: the logs of its processes and, on a node, the last order of each list and its settings."""
 
 import fcntl
 import os
@@ -9,20 +9,20 @@ from tessera_cli.files import replacing
 
 
 class LogFolder:
-    """One deputy at a time has it. Its processes carry the folder's path in their mark (tree.py), so that each can be found."""
+    """Used by one deputy at a time, whose processes carry its path in their mark (process_tree.py)."""
 
-    def __init__(self, path: Path, taken: str) -> None:
-        """Makes the folder. `taken`: the sentence if another deputy has it."""
+    def __init__(self, path: Path, sentence_if_used: str) -> None:
+        """Creates the folder. Raises UserError, with this sentence if another deputy uses it."""
         self.path = path
         try:
             self.log_path("any").parent.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(path, os.O_RDONLY)  # never closed: the lock goes with this process
+            self._lock = os.open(path, os.O_RDONLY)  # never closed: the lock ends with this process
         except OSError as error:
             raise UserError(f"the folder {path} can't be used: {error.strerror}.") from error
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise UserError(taken) from error
+            raise UserError(sentence_if_used) from error
 
     def log_path(self, process: str) -> Path:
         return self.path / f"{process}.log"
@@ -49,7 +49,7 @@ class StateFolder(LogFolder):
         return self.path / f"settings-{run}.yaml"
 
     def keep_settings(self, runs: set[str]) -> None:
-        """Of these runs; those of others are removed."""
+        """Removes the settings of all other runs."""
         kept = {self.settings_path(run) for run in runs}
         for path in self.path.glob("settings-*.yaml"):
             if path not in kept:
@@ -60,13 +60,13 @@ class StateFolder(LogFolder):
             written.write_bytes(data)
 
     def forget_orders(self, list_name: str) -> None:
-        """Of all lists if it is empty."""
+        """Of all lists if the name is empty."""
         for path in self._orders():
             if list_name in ("", path.name):
                 path.unlink()
 
     def last_orders(self) -> list[bytes]:
-        """One of each list that was not ended."""
+        """One for each list that was not ended."""
         return [path.read_bytes() for path in self._orders()]
 
     def _orders(self) -> list[Path]:

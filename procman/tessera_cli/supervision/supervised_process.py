@@ -1,77 +1,83 @@
-"""One process as its deputy wants it: started when what it depends on is ready, watched, started again, ended in time.
+"""One process as its deputy wants it: started when what it depends on is ready, watched, restarted, ended in time.
 
 `step` compares what is wanted with what runs and does the next thing. All times are monotonic seconds.
 
-  WAITING -> STARTING -> READY -> FINISHED         its stage says so on STATUS
-  any of these -> BACKING_OFF -> STARTING          it died and is worth another try
-               -> ENDED, FAILED                    it ended by itself, or is not worth another try
-               -> STOPPING -> STOPPED or WAITING   it is not wanted any more, or other than it runs
+  WAITING -> STARTING -> READY -> FINISHED         as its stage reports on STATUS
+  any of these -> BACKING_OFF -> STARTING          it failed and is restarted
+               -> ENDED, FAILED                    it ended by itself, or failed and is not restarted
+               -> STOPPING -> STOPPED or WAITING   it is no longer wanted, or wanted with another Launch
 """
 
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from tessera_cli.constants import FIRST_BACK_OFF_S, LONGEST_BACK_OFF_S, SETTLED_AFTER_S, STABLE_AFTER_S
 from tessera_cli.messages import procman_process_t as states
-from tessera_cli.supervision.child_process import Child, Launch, describe_exit
-from tessera_cli.supervision.log_file import RotatingLog
+from tessera_cli.supervision.child_process import ChildProcess, Launch, describe_exit
+from tessera_cli.supervision.log_file import ProcessLog
 from tessera_cli.supervision.process_tree import Usage
 
-# A start after a death waits this long, twice as long each time in a row.
-FIRST_BACK_OFF_S = 0.1
-LONGEST_BACK_OFF_S = 5.0
-# One of ready = "started" that lived this long is ready: what ends at once with an error never was.
-SETTLED_AFTER_S = 0.3
-# One that lived this long begins anew with the shortest wait.
-STABLE_AFTER_S = 10.0
-# One that dies so often in a row has a fault that starting it again does not mend; auto_respawn = "always" tries for ever.
-MAX_DEATHS_IN_A_ROW = 6
-# Of its output, what is kept to be quoted as its last words.
-MAX_LINE = 4000
+# A process that fails so often in a row has an error that restarts don't fix; auto_respawn = "always" never gives up.
+MAX_FAILURES_IN_A_ROW = 6
+# Of the last line of its output, which is quoted when it fails.
+MAX_LINE_BYTES = 4000
 STATE_NAMES = {
-    getattr(states, name): name.lower().replace("_", " ")
-    for name in ("WAITING", "STARTING", "READY", "FINISHED", "BACKING_OFF", "STOPPING", "STOPPED", "ENDED", "FAILED")
+    states.WAITING: "waiting",
+    states.STARTING: "starting",
+    states.READY: "ready",
+    states.FINISHED: "finished",
+    states.BACKING_OFF: "backing off",
+    states.STOPPING: "stopping",
+    states.STOPPED: "stopped",
+    states.ENDED: "ended",
+    states.FAILED: "failed",
 }
 UP = (states.STARTING, states.READY, states.FINISHED)
 READY = (states.READY, states.FINISHED)
 
 
 @dataclass(frozen=True)
-class Death:
+class Exit:
+    """How a process ended."""
+
     status: int  # exit status; negative: by that signal
-    how: str  # goes on after its name: "was killed by SIGKILL", "was not ready within 30 s"
-    last_words: str  # the last line of its output
+    description: str  # continues the process's name: "was killed by SIGKILL", "was not ready within 30 s"
+    last_line: str  # of its output
 
 
 @dataclass
-class Supervised:
+class SupervisedProcess:
+    """`step` is called regularly by the Supervisor."""
+
     name: str
     mark: str
-    log: RotatingLog
+    log: ProcessLog
     on_output: Callable[[str, bytes], None]  # name, what it wrote
     state: int = states.WAITING
     reason: str = ""
     wanted: Launch | None = None
-    session: str = ""  # of the order that wants it; a new one tries again what ended or failed
+    session: str = ""  # of the order that wants it; a new one restarts what ended or failed
     num_starts: int = 0
     started_at: float = 0.0
     usage: Usage = field(default_factory=Usage)
-    cpu_s: float = 0.0  # of the lives that are over, as the kernel accounts them
+    cpu_s: float = 0.0  # of its processes that have ended, as accounted by the kernel
     max_rss_mb: float = 0.0  # the highest peak of them
-    num_deaths: int = 0  # ends that nobody had asked for
-    last_death: Death | None = None  # of the last life, however it ended; None: it lives, or can't be started
-    child: Child | None = None
+    num_failures: int = 0  # unrequested ends, of any status
+    last_exit: Exit | None = None  # of its last process, for whatever reason; None: it runs, or can't be started
+    child: ChildProcess | None = None
     _running: Launch | None = None
     _heard_at: float = 0.0
     _due_at: float = 0.0
-    _kill_at: float | None = None  # set while it is asked to end
-    _fate: str = ""  # why we killed it
-    _deaths: int = 0
+    _kill_at: float | None = None  # set from the request to end
+    _kill_reason: str = ""  # set if the deputy has killed it
+    _failures_in_a_row: int = 0
     _last_line: bytes = b""
 
-    def want(self, launch: Launch | None, session: str) -> None:
+    def set_wanted(self, launch: Launch | None, session: str) -> None:
+        """None: it is to end."""
         if launch != self.wanted or (session != self.session and self.state in (states.ENDED, states.FAILED)):
-            self._deaths = 0
+            self._failures_in_a_row = 0
             if self.child is None:
                 self.state, self.reason = (states.WAITING if launch else states.STOPPED), ""
         self.wanted, self.session = launch, session
@@ -87,123 +93,132 @@ class Supervised:
         return launch.depends if launch else ()
 
     @property
-    def last_words(self) -> str:
-        return self._last_line.decode(errors="replace").strip() or "(it said nothing)"
+    def last_line(self) -> str:
+        """Of its output."""
+        return self._last_line.decode(errors="replace").strip() or "(it wrote nothing)"
 
-    def on_stage_status(self, is_finished: bool, heard_at: float) -> None:
-        """Its stage said that it runs."""
-        self._heard_at = max(self._heard_at, heard_at)
+    def on_stage_status(self, is_finished: bool, received_at: float) -> None:
+        """Its stage reported that it runs."""
+        self._heard_at = max(self._heard_at, received_at)
         if self.state in UP:
             self.state = states.FINISHED if is_finished else states.READY
 
-    def excuse(self, pause_s: float, now: float) -> None:
-        """The deputy itself stood still, and heard nobody meanwhile."""
+    def extend_time_outs(self, pause_s: float, now: float) -> None:
+        """The deputy itself was suspended and received nothing meanwhile."""
         self._heard_at = min(now, self._heard_at + pause_s)
 
-    def step(self, now: float, not_ready: Callable[[str], bool], has_dependents: bool) -> None:
-        """`not_ready` of another process; `has_dependents`: some that need this one still run, so it must not end yet."""
+    def step(self, now: float, is_not_ready: Callable[[str], bool], has_dependents: bool) -> None:
+        """`is_not_ready`: of another process; `has_dependents`: others that need this one run, so it must not end."""
         if self.child is None:
-            self._step_without_child(now, not_ready)
+            self._step_without_child(now, is_not_ready)
             return
-        self._read()
+        self._read(self.child)
         status = self.child.poll()
-        if status is not None and not (self._kill_at and now < self._kill_at and self.child.has_descendants()):
-            self._bury(status, now)
+        may_descendants_end = self._kill_at is not None and now < self._kill_at and self.child.has_descendants()
+        if status is not None and not may_descendants_end:
+            self._on_exit(self.child, status, now)
         elif self.wanted != self._running or self._kill_at is not None:
-            self._stop(now, has_dependents)
+            self._stop(self.child, now, has_dependents)
         elif status is None:
-            self._watch(now)
+            self._watch(self.child, now)
 
-    def _step_without_child(self, now: float, not_ready: Callable[[str], bool]) -> None:
+    def _step_without_child(self, now: float, is_not_ready: Callable[[str], bool]) -> None:
         if self.wanted is None or self.state in (states.ENDED, states.FAILED):
             return
         if self.state == states.BACKING_OFF and now < self._due_at:
             return
-        if missing := [name for name in self.wanted.depends if not_ready(name)]:
+        if missing := [name for name in self.wanted.depends if is_not_ready(name)]:
             self.state, self.reason = states.WAITING, f"waits for {', '.join(missing)}"
             return
-        self._start(now)
+        self._start(self.wanted, now)
 
-    def _start(self, now: float) -> None:
-        self._running, self._fate, self._kill_at, self._last_line, self.last_death = self.wanted, "", None, b"", None
+    def _start(self, launch: Launch, now: float) -> None:
+        self._kill_reason, self._kill_at, self._last_line, self.last_exit = "", None, b"", None
         if self.state == states.WAITING:
-            self.reason = ""  # after a death it says on what account it was started again
+            self.reason = ""  # after a failure it keeps telling why the process was restarted
         try:
-            self.child = Child(self._running, self.mark)
+            self.child = ChildProcess(launch, self.mark)
         except (OSError, subprocess.SubprocessError) as error:
-            self._running = None
             self.state, self.reason = states.FAILED, f"can't be started: {error}"
             return
+        self._running = launch
         self.num_starts += 1
         self.started_at = self._heard_at = now
         self.state = states.STARTING
 
-    def _watch(self, now: float) -> None:
+    def _watch(self, child: ChildProcess, now: float) -> None:
+        assert self._running is not None
         options = self._running.options
-        if self.state == states.STARTING and options.ready == "started" and now - self.started_at > SETTLED_AFTER_S:
+        lived_s, silent_s = now - self.started_at, now - self._heard_at
+        is_hanging = options.ready == "status" and 0 < options.hang_timeout_s < silent_s
+        if self.state == states.STARTING and options.ready == "started" and lived_s > SETTLED_AFTER_S:
             self.state = states.READY
-        elif self.state == states.STARTING and now - self._heard_at > options.ready_timeout_s:
-            self._kill(f"was not ready within {options.ready_timeout_s:g} s")
-        elif self.state in READY and options.ready == "status" and 0 < options.hang_timeout_s < now - self._heard_at:
-            self._kill(f"said nothing for {options.hang_timeout_s:g} s")
+        elif self.state == states.STARTING and silent_s > options.ready_timeout_s:
+            self._kill(child, f"was not ready within {options.ready_timeout_s:g} s")
+        elif self.state in READY and is_hanging:
+            self._kill(child, f"sent no status for {options.hang_timeout_s:g} s")
         elif 0 < options.memory_limit_mb < self.usage.rss_mb:
-            self._kill(f"used {self.usage.rss_mb:.0f} MB, more than its limit of {options.memory_limit_mb:g}")
+            limit = f"its limit of {options.memory_limit_mb:g}"
+            self._kill(child, f"used {self.usage.rss_mb:.0f} MB, more than {limit}")
 
-    def _kill(self, fate: str) -> None:
-        self._fate = fate
-        self.child.end()
+    def _kill(self, child: ChildProcess, reason: str) -> None:
+        self._kill_reason = reason
+        child.kill()
 
-    def _stop(self, now: float, has_dependents: bool) -> None:
+    def _stop(self, child: ChildProcess, now: float, has_dependents: bool) -> None:
+        assert self._running is not None
+        options = self._running.options
         if self._kill_at is None:
             if has_dependents:
                 return
             self.state, self.reason = states.STOPPING, ""
-            self._kill_at = now + self._running.options.stop_time_allowed
-            self.child.ask_to_end(self._running.options.stop_signal)
+            self._kill_at = now + options.stop_time_allowed
+            child.signal_group(options.stop_signal)
         elif now >= self._kill_at:
-            self.reason = f"did not end within {self._running.options.stop_time_allowed:g} s and was killed"
-            self.child.end()
+            self.reason = f"did not end within {options.stop_time_allowed:g} s and was killed"
+            child.kill()
 
-    def _read(self) -> None:
-        while data := self.child.read():
+    def _read(self, child: ChildProcess) -> None:
+        while data := child.read():
             self.log.write(data)
             self.on_output(self.name, data)
             lines = [line for line in (self._last_line + data).splitlines(keepends=True) if line.strip()]
-            self._last_line = lines[-1][-MAX_LINE:] if lines else b""
+            self._last_line = lines[-1][-MAX_LINE_BYTES:] if lines else b""
 
-    def _bury(self, status: int, now: float) -> None:
-        """The process is gone: its descendants go too, and what comes next is decided."""
-        self.child.end()
-        self._read()
-        self.child.close()
-        lived_s, was_stopped = now - self.started_at, self._kill_at is not None
-        self.cpu_s, self.max_rss_mb = self.cpu_s + self.child.cpu_s, max(self.max_rss_mb, self.child.max_rss_mb)
-        self.last_death = Death(status, self._fate or describe_exit(status), self.last_words)
+    def _on_exit(self, child: ChildProcess, status: int, now: float) -> None:
+        """The process has ended: its descendants are killed, and what comes next is decided."""
+        child.kill()
+        self._read(child)
+        child.close()
+        self.cpu_s, self.max_rss_mb = self.cpu_s + child.cpu_s, max(self.max_rss_mb, child.max_rss_mb)
+        last_exit = Exit(status, self._kill_reason or describe_exit(status), self.last_line)
         launch, self.child, self._running, self.usage = self._running, None, None, Usage()
-        if was_stopped or self.wanted != launch:
+        self.last_exit = last_exit
+        if self._kill_at is not None or launch is None or self.wanted != launch:
             self.state = states.WAITING if self.wanted else states.STOPPED
             return
-        self.num_deaths += 1
-        self._deaths = 1 if lived_s > STABLE_AFTER_S else self._deaths + 1
-        if self._is_worth_another_try(status):
+        self.num_failures += 1
+        self._failures_in_a_row = 1 if now - self.started_at > STABLE_AFTER_S else self._failures_in_a_row + 1
+        if self._is_restarted(launch, last_exit):
             self.state = states.BACKING_OFF
-            self._due_at = now + min(LONGEST_BACK_OFF_S, FIRST_BACK_OFF_S * 2 ** min(self._deaths - 1, 10))
+            self._due_at = now + min(LONGEST_BACK_OFF_S, FIRST_BACK_OFF_S * 2 ** min(self._failures_in_a_row - 1, 10))
         else:
-            self.state = states.ENDED if status == 0 and not self._fate else states.FAILED
-        says_why = status > 0 and not self._fate
-        self.reason = self.last_death.how + (f": {self.last_death.last_words}" if says_why else "")
+            self.state = states.ENDED if status == 0 and not self._kill_reason else states.FAILED
+        explains_itself = status > 0 and not self._kill_reason
+        self.reason = self.last_exit.description + (f": {last_exit.last_line}" if explains_itself else "")
 
-    def _is_worth_another_try(self, status: int) -> bool:
-        mode = self.wanted.options.auto_respawn
-        was_killed = status < 0 or bool(self._fate)
+    def _is_restarted(self, launch: Launch, last_exit: Exit) -> bool:
+        mode, status = launch.options.auto_respawn, last_exit.status
+        was_killed = status < 0 or bool(self._kill_reason)
         if mode == "always":
             return was_killed or status != 2
-        if self._deaths > MAX_DEATHS_IN_A_ROW:
-            how = f"died {self._deaths} times in a row, the last time it {self.last_death.how}"
-            self.last_death = replace(self.last_death, how=how)
+        if self._failures_in_a_row > MAX_FAILURES_IN_A_ROW:
+            description = f"ended {self._failures_in_a_row} times in a row, the last time it {last_exit.description}"
+            self.last_exit = replace(last_exit, description=description)
             return False
         return (mode == "failure" and (was_killed or status not in (0, 2))) or (mode == "killed" and was_killed)
 
     def kill(self) -> None:
+        """At once, with its descendants."""
         if self.child is not None:
-            self.child.end()
+            self.child.kill()

@@ -1,0 +1,148 @@
+#include "distribution/dispatcher_session.h"
+
+#include <algorithm>
+
+namespace tessera {
+namespace {
+
+std::string SizeText(int width_px, int height_px) { return std::to_string(width_px) + "x" + std::to_string(height_px); }
+
+}  // namespace
+
+void DispatcherSession::Receive(const CameraCalibration& calibration) {
+  if (calibration_) {
+    if (*calibration_ != calibration) {
+      reports_.push_back(
+          "the calibration changed within a stream; the new one is ignored: restart the stack for another camera");
+    }
+    return;
+  }
+  calibration_ = calibration;
+  for (Arrived& arrived : before_calibration_) Queue(std::move(arrived));
+  before_calibration_.clear();
+}
+
+void DispatcherSession::Receive(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us) {
+  last_frame_us_ = now_us;
+  if (!first_camera_epoch_us_) first_camera_epoch_us_ = arrival.camera_epoch_us;
+  if (frame.id <= newest_) {
+    // A camera that was started again repeats what is not tracked yet.
+    if (arrival.camera_epoch_us == *first_camera_epoch_us_) {
+      reports_.push_back("frame " + std::to_string(frame.id.value) + " came after frame " +
+                         std::to_string(newest_.value) + " and is ignored: is there a second camera?");
+    }
+    return;
+  }
+  NoteGapBefore(frame.id);
+  newest_ = frame.id;
+  Arrived arrived{frame, arrival.arrival_us, arrival.publish_us < options_.epoch_us};
+  if (calibration_) {
+    Queue(std::move(arrived));
+  } else {
+    HoldUntilCalibrated(std::move(arrived));
+  }
+}
+
+// Frames that got lost on the way from the camera, and that nobody could repair.
+void DispatcherSession::NoteGapBefore(FrameId frame) {
+  const FrameId known = std::max(newest_, tracked_);
+  if (!newest_.valid() || frame.value <= known.value + 1) return;
+  gap_begin_ = {known.value + 1};
+  gap_end_ = frame;
+  num_dropped_ += gap_end_.value - gap_begin_.value;
+}
+
+void DispatcherSession::HoldUntilCalibrated(Arrived arrived) {
+  const size_t num_waiting = before_calibration_.size();
+  if (num_waiting < kMaxFramesBeforeCalibration || MustKeep(arrived, static_cast<int64_t>(num_waiting))) {
+    before_calibration_.push_back(std::move(arrived));
+  } else {
+    ++num_dropped_;
+  }
+}
+
+void DispatcherSession::Queue(Arrived arrived) {
+  const FrameId id = arrived.frame.id;
+  if (id <= tracked_) {
+    queue_.SkipFrame(id);
+    return;
+  }
+  if (!IsAsCalibrated(arrived.frame)) {
+    ++num_dropped_;
+    reports_.push_back("frame " + std::to_string(id.value) + " is " +
+                       SizeText(arrived.frame.left.width, arrived.frame.left.height) +
+                       " px, but the calibration says " + SizeText(calibration_->width_px, calibration_->height_px) +
+                       ": the frame is dropped");
+    return;
+  }
+  const bool must_keep = MustKeep(arrived, queue_.num_waiting());
+  if (!queue_.AddFrame(std::move(arrived.frame), *calibration_, arrived.arrival_us, must_keep)) {
+    ++num_dropped_;
+    reports_.push_back("the pipeline is slower than the source: frame " + std::to_string(id.value) +
+                       " is dropped (more extractors, fewer features or a slower pace help)");
+  }
+}
+
+// A log player, too, sends what is old.
+bool DispatcherSession::MustKeep(const Arrived& arrived, int64_t num_waiting) const {
+  const CameraFrame& frame = arrived.frame;
+  const size_t num_bytes = frame.left.pixels.size() + frame.right.pixels.size() + 2 * frame.depth.pixels.size();
+  return arrived.is_late && num_waiting * static_cast<int64_t>(num_bytes) < options_.max_kept_bytes;
+}
+
+bool DispatcherSession::IsAsCalibrated(const CameraFrame& frame) const {
+  return frame.left.width == calibration_->width_px && frame.left.height == calibration_->height_px &&
+         frame.sensor == calibration_->sensor;
+}
+
+void DispatcherSession::Receive(const ExtractorReady& ready, int64_t now_us) {
+  queue_.HearExtractor(ready.extractor, ready.epoch_us, now_us, ready.num_robots);
+}
+
+void DispatcherSession::Receive(const TileAck& ack, int64_t reassembler_epoch_us) {
+  if (reassembler_epoch_us_ && *reassembler_epoch_us_ != reassembler_epoch_us) queue_.GiveAllAgain();
+  reassembler_epoch_us_ = reassembler_epoch_us;
+  queue_.SetRun(reassembler_epoch_us);
+  queue_.Acknowledge(ack.frame, ack.tiles);
+}
+
+void DispatcherSession::MarkTracked(FrameId frame) {
+  // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it
+  // out.
+  if (frame > tracked_ && frame >= gap_begin_ && frame < gap_end_) --num_dropped_;
+  tracked_ = std::max(tracked_, frame);
+  queue_.MarkTracked(frame);
+}
+
+void DispatcherSession::Receive(const EndOfStream& camera_end, int64_t now_us) {
+  if (camera_end_) return;
+  camera_end_ = camera_end;
+  last_frame_us_ = now_us;
+}
+
+void DispatcherSession::Watch(int64_t now_us) {
+  queue_.CheckExtractors(now_us);
+  const bool was_stuck = is_stuck_;
+  is_stuck_ = queue_.num_extractors() == 0 && !queue_.idle();
+  if (is_stuck_ && !was_stuck) {
+    reports_.push_back("no extractor answers and frames are waiting: start one (tessera-extractor --id 0)");
+  }
+  const bool is_unheard = !reassembler_epoch_us_ && !queue_.idle();
+  num_unheard_ = is_unheard ? num_unheard_ + 1 : 0;
+  if (num_unheard_ == kPatience) {
+    reports_.push_back("frames are waiting for the reassembler to say that it is there: start tessera-reassembler");
+  }
+}
+
+std::optional<EndOfStream> DispatcherSession::End(int64_t now_us) {
+  if (has_ended_ || !camera_end_ || !queue_.idle()) return std::nullopt;
+  const int64_t num_missing = std::max<int64_t>(0, camera_end_->num_frames - (newest_.value + 1));
+  if (num_missing > 0 && now_us - last_frame_us_ < kLastFrameTimeoutUs) return std::nullopt;
+  has_ended_ = true;
+  num_dropped_ += num_missing;
+  return EndOfStream{.stage = StageKind::kDispatcher,
+                     .num_frames = queue_.last_frame().value + 1,
+                     .num_dropped = camera_end_->num_dropped + num_dropped_};
+}
+
+}  // namespace tessera

@@ -1,0 +1,88 @@
+#include "tracking/tracker_time.h"
+
+#include <utility>
+
+namespace tessera {
+
+void TrackerTime::Receive(Delta delta) {
+  if (delta->number < next_delta_) return;
+  next_delta_ = delta->number + 1;
+  answered_ = delta->answers;
+  held_.push_back(std::move(delta));
+}
+
+void TrackerTime::SkipTo(const MapDelta& snapshot) {
+  held_.clear();
+  next_delta_ = snapshot.number + 1;
+  answered_ = snapshot.answers;
+}
+
+void TrackerTime::KeyframeSent(KeyframeId id, FrameId /*at*/) { last_sent_ = id; }
+
+std::vector<TrackerTime::Delta> TrackerTime::TakeDeltas(FrameId frame) {
+  std::vector<Delta> deltas;
+  while (!held_.empty() && IsDue(*held_.front(), frame)) {
+    deltas.push_back(std::move(held_.front()));
+    held_.pop_front();
+  }
+  return deltas;
+}
+
+bool TrackerTime::Ask(FrameId frame) {
+  asked_ = frame;
+  return true;
+}
+
+void TrackerTime::Receive(const RelocalizationAnswer& answer) {
+  if (!answer_ || answer.frame > answer_->frame) answer_ = answer;
+}
+
+void LogicalTime::KeyframeSent(KeyframeId id, FrameId at) {
+  TrackerTime::KeyframeSent(id, at);
+  sent_.push_back({id, at});
+}
+
+std::vector<TrackerTime::Delta> LogicalTime::TakeDeltas(FrameId frame) {
+  std::vector<Delta> deltas = TrackerTime::TakeDeltas(frame);
+  past_due_ = LastDue(frame);
+  while (!sent_.empty() && sent_.front().id <= past_due_) sent_.pop_front();
+  return deltas;
+}
+
+const RelocalizationAnswer* LogicalTime::TakeAnswer(FrameId frame) {
+  return asked_ == frame && IsAnswered() ? &*answer_ : nullptr;
+}
+
+KeyframeId LogicalTime::LastDue(FrameId frame) const {
+  KeyframeId due = past_due_;
+  for (const Sent& sent : sent_) {
+    if (sent.at.value > frame.value - map_delay_frames_) break;
+    due = sent.id;
+  }
+  return due;
+}
+
+const RelocalizationAnswer* LiveTime::TakeAnswer(FrameId /*frame*/) {
+  if (!asked_.valid() || !IsAnswered()) return nullptr;
+  asked_ = {};
+  return &*answer_;
+}
+
+bool ReplayTime::HasDeltas(FrameId frame) const {
+  const auto step = recorded_.steps.find(frame);
+  return step == recorded_.steps.end() || next_delta_ >= step->second || answered_ >= last_sent_;
+}
+
+bool ReplayTime::IsDue(const MapDelta& delta, FrameId frame) const {
+  const auto step = recorded_.steps.find(frame);
+  return step != recorded_.steps.end() && delta.number < step->second;
+}
+
+const RelocalizationAnswer* ReplayTime::TakeAnswer(FrameId frame) {
+  const auto used = recorded_.relocalized_by.find(frame);
+  if (used == recorded_.relocalized_by.end()) return nullptr;
+  const auto answer = recorded_.relocalizations.find(used->second);
+  return answer == recorded_.relocalizations.end() ? nullptr : &answer->second;
+}
+
+}  // namespace tessera

@@ -1,0 +1,34 @@
+"""tessera map: the map of a running stack as a point cloud."""
+
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from tessera_cli.cli.options import add_lan
+from tessera_cli.cli.parsing import add_command
+
+if TYPE_CHECKING:
+    from tessera_cli.cli.parsing import Commands
+
+EPILOG = """\
+Any viewer of point clouds opens the file: MeshLab, CloudCompare, Blender.
+
+examples:
+  procman/tessera map /tmp/now.ply
+  procman/tessera map /tmp/whole.ply --follow
+  procman/tessera map /tmp/robot_b.ply --prefix B_ --lan
+"""
+
+
+def add_parser(commands: "Commands") -> None:
+    summary = "Joins a running stack and writes its map as a point cloud (PLY)."
+    parser = add_command(commands, "map", main, summary, EPILOG)
+    parser.add_argument("path", metavar="OUT.ply", help="the file to write")
+    parser.add_argument("--follow", action="store_true", help="write when the run has ended, not at once")
+    parser.add_argument("--prefix", metavar="TEXT", default="", help="the stack's bus.channel_prefix, where it has one")
+    add_lan(parser)
+
+
+def main(arguments: Namespace) -> int:
+    from tessera_cli.runs.map_export import export_map
+
+    return export_map(arguments)

@@ -1,0 +1,29 @@
+"""tessera record: a source into a log."""
+
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from tessera_cli.cli.options import SOURCES, add_source_options
+from tessera_cli.cli.parsing import add_command
+
+if TYPE_CHECKING:
+    from tessera_cli.cli.parsing import Commands
+
+
+def add_parser(commands: "Commands") -> None:
+    parser = add_command(
+        commands,
+        "record",
+        main,
+        "Writes a source into an LCM log that stock lcm-logplayer can play.",
+        SOURCES + "\nexamples:\n  procman/tessera record kitti:data/kitti/sequences/03 logs/03.lcmlog\n",
+    )
+    parser.add_argument("source", metavar="SOURCE", help="see below")
+    parser.add_argument("log", metavar="LOG", help="the file to write")
+    add_source_options(parser)
+
+
+def main(arguments: Namespace) -> int:
+    from tessera_cli.runs.recording import record_source
+
+    return record_source(arguments)

@@ -1,0 +1,39 @@
+"""tessera spy: lcm-spy with Tessera's message types."""
+
+import os
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from tessera_cli.cli.options import add_port
+from tessera_cli.cli.parsing import add_command
+from tessera_cli.console import say
+from tessera_cli.constants import PORT_OFFSETS
+from tessera_cli.errors import RunError
+from tessera_cli.files import BUILD, ROOT
+
+if TYPE_CHECKING:
+    from tessera_cli.cli.parsing import Commands
+
+
+def add_parser(commands: "Commands") -> None:
+    summary, examples = "lcm-spy with Tessera's message types.", "examples:\n  procman/tessera spy --bus camera\n"
+    parser = add_command(commands, "spy", main, summary, examples)
+    parser.add_argument("--bus", choices=tuple(PORT_OFFSETS), default="main", help="default main")
+    add_port(parser)
+
+
+def main(arguments: Namespace) -> int:
+    from tessera_cli.lcm_bus import bus_url
+
+    jar = BUILD / "tessera_types.jar"
+    if not jar.is_file():
+        hint = "the build makes it where a JDK is installed; procman/tessera setup installs one"
+        raise RunError(f"{jar} is missing: {hint}.")
+    if not os.environ.get("DISPLAY"):
+        raise RunError("lcm-spy is a window and needs a display, but DISPLAY is not set.")
+    url = bus_url(arguments.port + PORT_OFFSETS[arguments.bus])
+    class_path = os.pathsep.join(filter(None, [str(jar), os.environ.get("CLASSPATH")]))
+    os.environ.update(CLASSPATH=class_path, LCM_DEFAULT_URL=url)
+    say(f"lcm-spy on {url}")
+    spy = ROOT / ".venv" / "bin" / "lcm-spy"
+    os.execv(spy, [str(spy), f"--lcm-url={url}"])

@@ -1,0 +1,132 @@
+"""Options that several commands share."""
+
+import os
+
+from tessera_cli.cli.parsing import Parser, assignment, frames, pace, tiles, whole_number
+from tessera_cli.constants import DEFAULT_PORT, MAX_INSTANCES
+
+SOURCES = """\
+SOURCE is one of
+  kitti:DIR    a sequence folder of the KITTI odometry benchmark
+  euroc:DIR    holds mav0/
+  tum:DIR      TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt
+  video:FILE   any video file that OpenCV reads; needs --camera, or FILE.yaml beside it
+  camera:N     V4L2 device /dev/videoN; needs --camera
+  rtsp://...   network stream; needs --camera
+  sim:NAME     a simulated world with exact truth: street, street-short or room; options after it:
+               sim:street,seed=3,length=500 (also speed=, noise=, scale= as factors, duration= of the room in s,
+               path=FILE of KITTI poses)
+  log:FILE     a log recorded by `tessera record`, `tessera run --record` or lcm-logger
+  bus:[URL]    frames that another program, such as lcm-logplayer, publishes; default: this stack's main bus
+"""
+# The extractors' own limit (features/feature_types.cc), checked before anything starts.
+MAX_FEATURES = 50000
+
+
+def add_features(parser: Parser) -> None:
+    count = whole_number(1, MAX_FEATURES)
+    parser.add_argument("--features", type=count, metavar="N", help="keypoints per image, default 2000")
+
+
+def add_settings(parser: Parser) -> None:
+    parser.add_argument(
+        "--set",
+        dest="settings",
+        type=assignment,
+        metavar="section.key=value",
+        action="append",
+        default=[],
+        help="any setting of config/default.yaml; may be repeated",
+    )
+
+
+def add_port(parser: Parser) -> None:
+    parser.add_argument(
+        "--port",
+        type=whole_number(1024, 65000),
+        metavar="N",
+        default=DEFAULT_PORT,
+        help=f"base port of the buses, for a second stack on one machine; default {DEFAULT_PORT}",
+    )
+
+
+def add_lan(parser: Parser) -> None:
+    """--lan and --port."""
+    parser.add_argument(
+        "--lan",
+        action="store_true",
+        help="use the network (ttl 1), not this machine alone; TESSERA_LAN=1 in the environment does the same",
+    )
+    add_port(parser)
+
+
+def add_timeout(parser: Parser, seconds: int) -> None:
+    parser.add_argument(
+        "--timeout",
+        type=whole_number(1, 86400),
+        metavar="S",
+        default=seconds,
+        help=f"seconds to wait, default {seconds}",
+    )
+
+
+def add_source_options(parser: Parser) -> None:
+    """Of commands that read a source."""
+    parser.add_argument("--sensor", choices=("mono", "stereo", "rgbd"), default="mono", help="default mono")
+    parser.add_argument(
+        "--camera", metavar="FILE.yaml", help="calibration, where the source brings none, or instead of its own"
+    )
+    parser.add_argument("--frames", type=frames, metavar="A:B", default=(0, -1), help="only frames A..B-1")
+    add_settings(parser)
+
+
+def add_run_options(parser: Parser) -> None:
+    """Of commands that run the whole stack."""
+    add_source_options(parser)
+    parser.add_argument(
+        "--extractors",
+        type=whole_number(0, MAX_INSTANCES),
+        metavar="P",
+        default=os.cpu_count() or 1,
+        help="extractor processes, default: cores of this machine; 0: those of a running pool (procman/pool.pmd)",
+    )
+    parser.add_argument(
+        "--prefix",
+        metavar="TEXT",
+        default="",
+        help="before every channel's name, such as a_, for several robots on one bus",
+    )
+    parser.add_argument(
+        "--tiles",
+        type=tiles,
+        metavar="LxC",
+        default="1x1",
+        help="lines x columns into which images are cut, default 1x1",
+    )
+    add_features(parser)
+    parser.add_argument(
+        "--pace",
+        type=pace,
+        metavar="lockstep|realtime|X",
+        help="default lockstep for files, realtime for cameras; X is a speed factor",
+    )
+    parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-<source name>")
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="the tracker never waits for the mapper; a recording of such a run can be replayed exactly",
+    )
+    _add_map_options(parser)
+    parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
+    add_port(parser)
+
+
+def _add_map_options(parser: Parser) -> None:
+    parser.add_argument("--no-loop-closing", action="store_true", help="don't correct the map where a loop closes")
+    parser.add_argument("--load-map", metavar="FILE", help="continue in the map of an earlier run: its map.tessera")
+    parser.add_argument("--save-map", metavar="FILE", help="one more copy of the run's map.tessera")
+    parser.add_argument(
+        "--localize-only",
+        action="store_true",
+        help="find the camera in the map of --load-map, and leave the map unchanged",
+    )

@@ -1,0 +1,95 @@
+"""Names and numbers that the whole command shares: ports, channels, limits, periods and time-outs."""
+
+# --- Network ------------------------------------------------------------------------------------------------------
+MULTICAST_GROUP = "239.255.76.67"
+DEFAULT_PORT = 7667
+# Of each bus, from the base port (--port).
+PORT_OFFSETS = {"main": 0, "camera": 1, "work": 2, "procman": 3}
+FIRST_TILE_PORT_OFFSET = 13
+# A message that fits one packet of a LAN: the loss of one fragment would lose a larger message whole.
+LAN_MESSAGE_BYTES = 1400
+# Bursts of tiles need receive buffers of this size; setup.sh raises the kernel's limit to it.
+RECEIVE_BUFFER_BYTES = 4194304
+# Messages that LCM keeps for a subscriber. Poses come in bursts, and LCM's default of 30 would drop some.
+QUEUE_CAPACITY = 1000
+# Messages handled before a loop looks at its processes again.
+MAX_MESSAGES_PER_TURN = 200
+
+# --- Channels (lcmtypes/README.md) --------------------------------------------------------------------------------
+STATUS, POSE, HEARTBEAT, CAMERA, END_OF_STREAM = "STATUS", "POSE", "HEARTBEAT", "CAMERA", "END_OF_STREAM"
+PROCMAN_ORDER, PROCMAN_STATUS, PROCMAN_OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
+
+# --- Limits -------------------------------------------------------------------------------------------------------
+# Extractors that a dispatcher accepts.
+MAX_INSTANCES = 256
+# Of a process list or an order. A list of a hundred nodes takes some tens of kilobytes.
+MAX_LIST_BYTES = 1_000_000
+MAX_ORDER_BYTES = 1_000_000
+# Output of one process that is forwarded per OUTPUT_PERIOD_S: 10 kB/s, which leaves the network to images.
+MAX_OUTPUT_BYTES = 2000
+# The end of a log travels in pieces that fit one packet of any network.
+TAIL_PIECE_BYTES = 1000
+LOG_FILE_BYTES = 10_000_000
+NUM_OLD_LOG_FILES = 3
+# More extractors than this are shown as one, in the live panel and in reports.
+MAX_EXTRACTORS_SHOWN = 4
+
+# --- Periods, in seconds unless the name says otherwise -----------------------------------------------------------
+# One turn of a loop that waits for messages.
+LISTEN_S = 0.05
+# Deputies publish their status so often; stages publish theirs twice as often.
+DEPUTY_STATUS_PERIOD_S = 1.0
+USAGE_PERIOD_S = 1.0
+OUTPUT_PERIOD_S = 0.2
+ORDER_REPEAT_S = 0.3
+STOP_POLL_S = 0.01
+RECORDING_POLL_S = 0.1
+RUN_PANEL_PERIOD_S = 0.25
+WATCH_PANEL_PERIOD_S = 0.5
+# Between two lines where there is no terminal.
+LINE_PERIOD_S = 5.0
+# The frame rate shown is that of the last poses only, so that it follows changes.
+FRAME_RATE_WINDOW_S = 5.0
+
+# --- Time-outs of a run -------------------------------------------------------------------------------------------
+# A bus without a heartbeat for this long is free: every stage sends ten a second.
+FREE_BUS_S = 0.25
+# A process that does not report within this time never will; LCM's self-test alone may take 10 s.
+START_TIMEOUT_S = 20.0
+# A stored source without a new pose for this long is stuck, unless a stage works on the map: repairs and late tiles
+# take a few seconds, but the adjustment of a large map, which frames may have to wait for, takes minutes.
+STALL_TIMEOUT_S = 120.0
+ADJUSTMENT_TIMEOUT_S = 900.0
+# After Ctrl-C, the time in which frames that are already in the pipeline may still be tracked.
+DRAIN_TIMEOUT_S = 3.0
+# After Ctrl-C a recording camera ends its stream and writes what it has to the disk.
+RECORDER_STOP_TIMEOUT_S = 60.0
+MAP_WRITER_STOP_TIMEOUT_S = 5.0
+# A stack without any status for this long has ended.
+SILENT_STACK_S = 5.0
+
+# --- Time-outs of supervised processes ----------------------------------------------------------------------------
+# The wait before a restart, doubled with each failure in a row.
+FIRST_BACK_OFF_S = 0.1
+LONGEST_BACK_OFF_S = 5.0
+# A process with ready = "started" is ready when it has lived this long: one that fails at once never was.
+SETTLED_AFTER_S = 0.3
+# After this long, a failure counts as the first one again.
+STABLE_AFTER_S = 10.0
+KILL_TIMEOUT_S = 5.0
+# The state of another deputy's processes is unknown when it is older than this.
+REMOTE_STATE_TIMEOUT_S = 5.0
+# A deputy whose loop takes longer was itself suspended (Ctrl-Z) or did not get the processor.
+LONGEST_TURN_S = 1.0
+
+# --- Time-outs between sheriff and deputies -----------------------------------------------------------------------
+# Somewhat more than DEPUTY_STATUS_PERIOD_S: every deputy is heard once.
+DISCOVERY_S = 1.3
+DUPLICATE_DEPUTY_S = 1.5
+SILENT_DEPUTY_S = 3.5
+FIND_DEPUTY_TIMEOUT_S = 5.0
+# LCM's self-test on the deputy's side may take 10 s.
+ORDER_TIMEOUT_S = 15.0
+# A deputy that in this time counts orders with unknown keys, and obeys none, counts ours.
+DISTRUST_TIMEOUT_S = 3.0
+TAIL_TIMEOUT_S = 5.0

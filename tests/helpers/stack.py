@@ -1,0 +1,115 @@
+"""The real command, started as a user starts it, with each run on ports and in a folder of its own."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+# A run of a few frames takes seconds; a hang must not stop the whole suite.
+RUN_TIMEOUT_S = 120.0
+NUM_FRAMES = 60
+PORTS_PER_RUN = 40
+# Two test suites on one machine use different ports.
+FIRST_PORT = 20000 + (os.getpid() % 50) * 800
+
+
+def environment() -> dict[str, str]:
+    """In which the command is started."""
+    return {**os.environ, "PYTHONPATH": str(ROOT / "procman")}
+
+
+def wait_for(condition: Callable[[], object], what: str, timeout_s: float = RUN_TIMEOUT_S) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"waited in vain for {what}"
+        time.sleep(0.02)
+
+
+def read_line(process: "subprocess.Popen[str]") -> str:
+    """The next line of its output; empty at its end."""
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+def must_succeed(process: "subprocess.Popen[str]") -> None:
+    """Waits for its end."""
+    out, _ = process.communicate(timeout=RUN_TIMEOUT_S)
+    assert process.returncode == 0, out
+
+
+@dataclass
+class Finished:
+    """A command that has ended."""
+
+    status: int
+    out: str
+    err: str
+    folder: Path
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        return json.loads((self.folder / "summary.json").read_text())
+
+    def must_end_well(self) -> "Finished":
+        assert self.status == 0, self.out + self.err
+        return self
+
+    def must_refuse(self, *words: str) -> None:
+        """One sentence with these words, and exit status 2."""
+        assert self.status == 2, self.out + self.err
+        assert self.err.count("\n") == 1, self.err
+        assert self.err.startswith("tessera: ")
+        for word in words:
+            assert word in self.err
+
+
+class Tessera:
+    """`command` starts any subcommand, `run` one with a folder and ports of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._num_runs = 0
+
+    def command(self, *arguments: object, timeout: float = RUN_TIMEOUT_S) -> Finished:
+        finished = subprocess.run(
+            self._command_line(arguments),
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            env=environment(),
+            stdin=subprocess.DEVNULL,
+        )
+        return Finished(finished.returncode, finished.stdout, finished.stderr, self._folder)
+
+    def run(self, *arguments: object, command: str = "run") -> Finished:
+        port, folder = self.next_port(), self.next_folder()
+        finished = self.command(command, *arguments, "--port", port, "--out", folder)
+        finished.folder = folder
+        return finished
+
+    def start(self, *arguments: object) -> "subprocess.Popen[str]":
+        """In the background; ends when the test ends it."""
+        return subprocess.Popen(
+            self._command_line(arguments),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment(),
+            stdin=subprocess.DEVNULL,
+        )
+
+    def next_port(self) -> int:
+        self._num_runs += 1
+        return FIRST_PORT + PORTS_PER_RUN * (self._num_runs % 20)
+
+    def next_folder(self) -> Path:
+        return self._folder / f"run {self._num_runs}"
+
+    def _command_line(self, arguments: tuple[object, ...]) -> list[str]:
+        return [sys.executable, "-m", "tessera_cli", *map(str, arguments)]

@@ -1,0 +1,90 @@
+// Which keyframes say nothing that others do not, and what their removal leaves behind.
+#include "mapping/keyframe_culling.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <vector>
+
+#include "map/map_editor.h"
+#include "support/matchers.h"
+#include "support/synthetic_world.h"
+
+namespace tessera {
+namespace {
+
+// Keyframes 0 .. 9 of a camera that hardly moves: every landmark has ten observers.
+class KeyframeCulling : public testing::Test {
+ protected:
+  static constexpr int64_t kNum = 10;
+
+  void Plant(const std::function<void(int64_t, FeatureFrame&)>& change = [](int64_t, FeatureFrame&) {}) {
+    for (int64_t k = 0; k < kNum; ++k) {
+      planted_.Add(0, {k - 1}, 0, {}, [&](FeatureFrame& features) { change(k, features); });
+    }
+  }
+  void Cull(const KeyframeCullingOptions& options = {}) {
+    MapEditor editor(planted_.map());
+    CullKeyframes({kNum - 1}, options, removed_, editor);
+    (void)editor.Finish({kNum - 1});
+  }
+  std::vector<int64_t> Left() const {
+    std::vector<int64_t> left;
+    map().keyframes().ForEach([&](KeyframeId id, const Keyframe&) { left.push_back(id.value); });
+    return left;
+  }
+  const Map& map() const { return planted_.map(); }
+
+  SyntheticWorld world_{SensorType::kStereo};
+  PlantedMap planted_{world_};
+  RemovedKeyframes removed_;
+};
+
+TEST_F(KeyframeCulling, RedundantKeyframesGoButForTheRootAndTheNewest) {
+  Plant();
+  Cull({.kept_newest = 3});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 7, 8, 9}));
+}
+
+TEST_F(KeyframeCulling, ALandmarkNeedsSeveralOtherObservers) {
+  Plant();
+  Cull({.redundant_observers = 8, .kept_newest = 1});
+  EXPECT_EQ(Left().size(), 8U) << "of eight keyframes each has seven others";
+}
+
+// Most points of this world are seen on levels above 1.
+TEST_F(KeyframeCulling, OnlyObserversOnAFineEnoughLevelCount) {
+  Plant([](int64_t k, FeatureFrame& features) {
+    if (k != 4) return;
+    for (Keypoint& keypoint : features.keypoints) keypoint.level = 0;
+  });
+  Cull();
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 4, 7, 8, 9})) << "no other keyframe observes its landmarks as finely";
+}
+
+TEST_F(KeyframeCulling, KeyframesThatClosedALoopStay) {
+  Plant();
+  MapEditor editor(planted_.map());
+  editor.AddClosedLoop({{5}, {2}, 1.0, 50});
+  (void)editor.Finish({kNum - 1});
+  Cull();
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 2, 5, 7, 8, 9}));
+}
+
+TEST_F(KeyframeCulling, ChildrenPassToTheParentAndTheRemovedAreRemembered) {
+  Plant();
+  const Sim3 before = map().FindKeyframe({4})->WorldFromKeyframe();
+  Cull();
+  EXPECT_EQ(map().FindKeyframe({7})->parent, KeyframeId{0});
+  ASSERT_TRUE(removed_.Find(map(), {4}).has_value());
+  EXPECT_THAT(*removed_.Find(map(), {4}), IsNear(before, 1e-9));
+}
+
+TEST(KeyframeCullingOptions, OutOfRangeIsRefused) {
+  EXPECT_THAT(KeyframeCullingOptions{}.Check(), IsSuccess());
+  EXPECT_THAT(KeyframeCullingOptions{.redundant_share = 0.0}.Check(), IsFailure(HasSubstr("positive")));
+  EXPECT_THAT(KeyframeCullingOptions{.kept_newest = 0}.Check(), IsFailure(HasSubstr("positive")));
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,292 @@
+"""report.html: whole, self-contained, told in words, and readable for those who can't see its figures."""
+
+import re
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from helpers.made_run import LOST, NUM_FRAMES, write_run
+from tessera_cli.report.html_report import TEMPLATES, write_report
+from tessera_cli.report.sentences import remarks
+from tessera_cli.runs.run_folder import Result, read_pair, read_run
+
+VOID = {"meta", "wbr", "link", "br", "hr", "img", "input"}
+# Namespaces are names that nobody fetches.
+NAMESPACES = ("http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink")
+FIGURES_OF_A_RUN = 9
+
+
+@dataclass
+class Element:
+    tag: str
+    attributes: dict
+    children: list = field(default_factory=list)
+    text: str = ""
+
+    def all(self, tag: str) -> list["Element"]:
+        return ([self] if self.tag == tag else []) + [found for child in self.children for found in child.all(tag)]
+
+    def words(self) -> str:
+        return " ".join([self.text, *(child.words() for child in self.children)])
+
+
+class Page(HTMLParser):
+    """Fails where a browser would have to guess: every element must be closed by its own tag, in order."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(convert_charrefs=True)
+        self.root = Element("", {})
+        self._open = [self.root]
+        self.source = path.read_text()
+        self.feed(self.source)
+        self.close()
+        assert [element.tag for element in self._open] == [""], "unclosed"
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        assert len(dict(attributes)) == len(attributes), f"<{tag}> has an attribute twice"
+        element = Element(tag, dict(attributes))
+        self._open[-1].children.append(element)
+        if tag not in VOID:
+            self._open.append(element)
+
+    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self._open[-1].children.append(Element(tag, dict(attributes)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop().tag == tag, f"</{tag}> at line {self.getpos()[0]} closes another element"
+
+    def handle_data(self, data: str) -> None:
+        self._open[-1].text += data
+
+    def every(self) -> list[Element]:
+        found, rest = [], [self.root]
+        while rest:
+            element = rest.pop()
+            found.append(element)
+            rest += element.children
+        return found
+
+
+def make_page(folder: Path, *results: Result) -> Page:
+    write_report(list(results), folder / "report.html")
+    assert not list(folder.glob(".unfinished*"))
+    return Page(folder / "report.html")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Page:
+    folder = tmp_path_factory.mktemp("report")
+    return make_page(folder, read_run(write_run(folder / 'drive <1> & "2"')))
+
+
+def test_it_is_one_document(page: Page) -> None:
+    assert page.source.lstrip().startswith("<!DOCTYPE html>")
+    for tag in ("html", "head", "title", "body", "main", "h1"):
+        assert len(page.root.all(tag)) >= 1, tag
+    assert page.root.all("h1")[0].words().strip() == 'drive <1> & "2"'
+
+
+def test_nothing_is_fetched(page: Page) -> None:
+    for element in page.every():
+        assert element.tag not in ("script", "link", "iframe", "object", "embed"), element.tag
+        for name, value in element.attributes.items():
+            if name in ("src", "href", "xlink:href", "srcset", "action", "data"):
+                assert value.startswith(("#", "data:")), f"<{element.tag} {name}={value}>"
+    without = page.source
+    for namespace in NAMESPACES:
+        without = without.replace(f'="{namespace}"', "")
+    assert not re.search(r"https?://|@import|url\((?!#)", without)
+
+
+def test_ids_are_unique_and_references_lead_somewhere(page: Page) -> None:
+    ids = [element.attributes["id"] for element in page.every() if "id" in element.attributes]
+    assert len(ids) == len(set(ids))
+    references = re.findall(r'url\(#([^)]+)\)|xlink:href="#([^"]+)"', page.source)
+    assert references and {first or second for first, second in references} <= set(ids)
+
+
+def test_every_figure_is_told_in_words(page: Page) -> None:
+    figures = page.root.all("figure")
+    assert len(figures) == FIGURES_OF_A_RUN
+    for figure in figures:
+        assert figure.all("figcaption")[0].words().strip() and figure.all("h3")[0].words().strip()
+        for svg in figure.all("svg"):
+            assert svg.attributes["role"] == "img"
+            assert len(svg.attributes["aria-label"].split()) > 5, figure.all("h3")[0].words()
+    assert all(image.attributes.get("alt") for image in page.root.all("img"))
+
+
+def test_tables_scroll_and_have_headings(page: Page) -> None:
+    for region in page.every():
+        if "scroll" in (region.attributes.get("class") or "").split():
+            assert region.attributes["tabindex"] == "0" and region.attributes["aria-label"]
+    assert all(table.all("th") for table in page.root.all("table"))
+    assert all(heading.attributes.get("scope") for heading in page.root.all("th"))
+
+
+def test_the_result_is_told_in_words(page: Page) -> None:
+    words = re.sub(r"\s+", " ", page.root.all("main")[0].words())
+    tracked = NUM_FRAMES - len(LOST)
+    for sentence in (
+        f"{tracked} of {NUM_FRAMES} frames were tracked",
+        "1 loop was closed.",
+        "Tracking failed 2 times",
+        "relocalized 2 times",
+        "4 frames got no pose: 40 to 42, 77.",
+        "4.3 times as fast as the camera",
+    ):
+        assert sentence in words, words[:1000]
+    assert "num_features" in words and "1234" in words and "0123456789ab" in words
+
+
+def test_figures_follow_the_colors_of_the_page(page: Page) -> None:
+    """Only variables of the style sheet, which has them for light and dark."""
+    for svg in re.findall(r"<svg.*?</svg>", page.source, re.DOTALL):
+        assert not re.search(r"(fill|stroke): #", svg)
+    used = set(re.findall(r"var\((--[a-z0-9-]+)\)", page.source))
+    light, dark = (set(scheme) for scheme in colors_of_schemes())
+    assert used <= light and light == dark
+
+
+def colors_of_schemes() -> list[dict[str, str]]:
+    """The variables of the light and the dark scheme."""
+    blocks = re.findall(r":root \{(.*?)\}", (TEMPLATES / "report.css").read_text(), re.DOTALL)
+    return [dict(re.findall(r"(--[a-z0-9-]+): (#[0-9a-f]{6})", block)) for block in blocks]
+
+
+def luminance(color: str) -> float:
+    """Relative luminance by WCAG 2."""
+    parts = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    darker, lighter = sorted((luminance(one), luminance(other)))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+@pytest.mark.parametrize("scheme", [0, 1], ids=["light", "dark"])
+def test_colors_have_the_contrast_that_wcag_asks_for(scheme: int) -> None:
+    colors = colors_of_schemes()[scheme]
+    for text in ("--ink", "--soft"):
+        for ground in ("--card", "--page"):
+            assert contrast(colors[text], colors[ground]) >= 4.5, (text, ground)
+    assert contrast(colors["--ink"], colors["--note"]) >= 4.5
+    assert contrast(colors["--good"], colors["--page"]) >= 4.5
+    for name, color in colors.items():
+        if name.startswith("--series") or name == "--bad":
+            assert contrast(color, colors["--card"]) >= 3, name
+
+
+def test_a_run_without_ground_truth(tmp_path: Path) -> None:
+    page = make_page(tmp_path, read_run(write_run(tmp_path / "drive", truth=False, sensor="mono")))
+    words = page.root.all("main")[0].words()
+    assert "no ground truth" in words and "map units" in words
+    assert len(page.root.all("figure")) == FIGURES_OF_A_RUN - 1
+
+
+def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:
+    folder = write_run(
+        tmp_path / "drive", loops=False, frames_tracked=0, pose_time_ms=None, latency_ms=None, map_wait_ms=None
+    )
+    for name in ("trajectory.txt", "trajectory_live.txt", "keyframes.txt"):
+        (folder / name).write_text("# timestamp tx ty tz qx qy qz qw\n")
+    (folder / "frames.csv").unlink()
+    page = make_page(tmp_path, read_run(folder))
+    assert "no frame was tracked" in page.root.all("main")[0].words()
+
+
+def test_an_older_run_without_what_came_later(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "drive", loops=False, loops_closed=None, relocalizations=None, versions={})
+    for name in ("settings.yaml", "trajectory_live.txt"):
+        (folder / name).unlink()
+    words = make_page(tmp_path, read_run(folder)).root.all("main")[0].words()
+    assert "did not record" in words and "loop" not in words.split("Figures")[0]
+
+
+def test_two_trajectory_files(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "drive")
+    page = make_page(tmp_path, read_pair(folder / "trajectory.txt", folder / "ground_truth.txt"))
+    assert len(page.root.all("figure")) == 3
+    assert "RMS" in page.root.all("main")[0].words()
+
+
+def test_several_runs_beside_each_other(tmp_path: Path) -> None:
+    """One plot for those of one truth, one more for another; all in one table."""
+    runs = [read_run(write_run(tmp_path / name, seed)) for seed, name in enumerate(("one", "two"))]
+    without = read_run(write_run(tmp_path / "three", 3, truth=False))
+    page = make_page(tmp_path, *runs, without)
+    titles = [figure.all("h3")[0].words().strip() for figure in page.root.all("figure")]
+    assert titles[:4] == [
+        "The path from above: one, two",
+        "The path from the side: one, two",
+        "The path from above: three",
+        "The path from the side: three",
+    ]
+    headings = [heading.words().strip() for heading in page.root.all("table")[0].all("thead")[0].all("th")]
+    assert headings == ["figure", "one", "two", "three"]
+
+
+@pytest.mark.parametrize("number", [1, 12])
+def test_more_runs_than_colors(tmp_path: Path, number: int) -> None:
+    runs = [read_run(write_run(tmp_path / f"run {index}", index)) for index in range(number)]
+    assert len(make_page(tmp_path, *runs).root.all("table")[0].all("thead")[0].all("th")) == number + 1
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        ({"ended": "interrupted"}, "was interrupted"),
+        ({"ended": "tracker died."}, "The run failed: tracker died."),
+        ({"frames_dropped": 3}, "3 frames never reached the tracker"),
+        ({"messages_repaired": 1}, "1 message got lost on the network and was"),
+        ({"messages_lost": 2}, "2 messages stayed lost"),
+        ({"messages_undecodable": 5}, "5 messages could not be decoded"),
+        ({"extractor_restarts": 1}, "restarted 1 time"),
+        ({"warnings": ["mapper was killed."]}, "mapper was killed."),
+        ({"map_wait_ms": {"mean": 20.0, "p95": 80.0, "median": 1.0}}, "waited for the mapper 20.0 ms"),
+    ],
+)
+def test_what_went_wrong_is_told(tmp_path: Path, change: dict[str, Any], sentence: str) -> None:
+    assert any(sentence in remark for remark in remarks(read_run(write_run(tmp_path / "drive", **change))))
+
+
+def test_what_processes_reported_is_told(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "drive")
+    (folder / "stages" / "tracker.log").write_text(
+        "10:00:00.000 tracker info: all well\n10:00:01.000 tracker warning: a gap: 3 frames\n"
+    )
+    assert "tracker reported 1 problem, the first: a gap: 3 frames" in remarks(read_run(folder))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("num_frames", [1, 2, 3])
+def test_a_run_of_a_few_frames(tmp_path: Path, num_frames: int) -> None:
+    """Nothing to draw a line through, no spread and no duration: told without a warning."""
+    folder = write_run(
+        tmp_path / "drive", loops=False, frames=num_frames, frames_tracked=num_frames, wall_s=0.0, frames_per_s=None
+    )
+    for name, lines_before in (
+        ("trajectory.txt", 1),
+        ("trajectory_live.txt", 1),
+        ("ground_truth.txt", 0),
+        ("frames.csv", 1),
+    ):
+        lines = (folder / name).read_text().splitlines(keepends=True)
+        (folder / name).write_text("".join(lines[: lines_before + num_frames]))
+    page = make_page(tmp_path, read_run(folder))
+    assert page.root.all("figure") and "nan" not in page.root.all("main")[0].words().split()
+
+
+@pytest.mark.filterwarnings("error")
+def test_frames_of_which_nothing_is_known(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "drive", loops=False)
+    rows = (folder / "frames.csv").read_text().splitlines()
+    (folder / "frames.csv").write_text(
+        "\n".join([rows[0]] + [",".join(row.split(",")[:2]) + ",initializing,,,,,,,,0,0" for row in rows[1:]]) + "\n"
+    )
+    assert make_page(tmp_path, read_run(folder)).root.all("figure")
