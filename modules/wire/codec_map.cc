@@ -145,19 +145,19 @@ struct Codec<RemovedInDelta> {
   template <class Emit>
   static void Cut(const RemovedInDelta& removed, Message* message, size_t max_bytes, Emit emit) {
     message->delta = removed.delta;
-    message->num_links = 0;
+    message->num_ties = 0;
     const auto overhead = static_cast<size_t>(message->getEncodedSize());
     const size_t per_part = std::max<size_t>(1, (max_bytes - std::min(max_bytes, overhead)) / kBytesPerTie);
     size_t next = 0;
     do {
-      message->links.clear();
-      for (; next < removed.links.size() && message->links.size() < per_part; ++next) {
-        keyframe_link_t& link = message->links.emplace_back();
+      message->ties.clear();
+      for (; next < removed.links.size() && message->ties.size() < per_part; ++next) {
+        keyframe_tie_t& link = message->ties.emplace_back();
         link.keyframe = removed.links[next].keyframe.value;
         link.parent = removed.links[next].parent.value;
         link.parent_from_keyframe = ToMessage(removed.links[next].parent_from_keyframe);
       }
-      message->num_links = static_cast<int32_t>(message->links.size());
+      message->num_ties = static_cast<int32_t>(message->ties.size());
       emit(*message);
     } while (next < removed.links.size());
   }
@@ -165,12 +165,12 @@ struct Codec<RemovedInDelta> {
     if (message.header.part == 0) *removed = {message.delta, {}};
     std::string problem =
         SentenceUnless(message.delta >= 0 && message.delta == removed->delta, "its delta is out of range");
-    for (size_t i = 0; problem.empty() && i < static_cast<size_t>(message.num_links); ++i) {
+    for (size_t i = 0; problem.empty() && i < static_cast<size_t>(message.num_ties); ++i) {
       KeyframeLink& link = removed->links.emplace_back();
-      link.keyframe.value = message.links[i].keyframe;
-      link.parent.value = message.links[i].parent;
+      link.keyframe.value = message.ties[i].keyframe;
+      link.parent.value = message.ties[i].parent;
       problem = FirstProblem({SentenceUnless(tie.parent.valid() && tie.keyframe.valid(), "a keyframe is out of range"),
-                              FromMessage(message.links[i].parent_from_keyframe, &link.parent_from_keyframe)});
+                              FromMessage(message.ties[i].parent_from_keyframe, &link.parent_from_keyframe)});
     }
     return problem;
   }
