@@ -157,11 +157,11 @@ TESSERA_CODEC(MapRequest, map_request_t);
 template <>
 struct Layout<keyframe_tie_t> {
   template <class Fields, class Message, class Value>
-  static void Describe(Fields& fields, Message& message, Value& tie) {
-    fields(message.keyframe, tie.keyframe);
-    fields(message.parent, tie.parent);
-    fields(message.parent_from_keyframe, tie.parent_from_keyframe);
-    fields.Check(tie.keyframe.valid() && tie.parent.valid(), "a keyframe's number is negative");
+  static void Describe(Fields& fields, Message& message, Value& link) {
+    fields(message.keyframe, link.keyframe);
+    fields(message.parent, link.parent);
+    fields(message.parent_from_keyframe, link.parent_from_keyframe);
+    fields.Check(link.keyframe.valid() && link.parent.valid(), "a keyframe's number is negative");
   }
 };
 
@@ -171,7 +171,7 @@ struct Layout<removed_keyframes_t> {
   static void Describe(Fields& fields, Message& message, Value& removed) {
     fields.Key(message.delta, removed.delta);
     fields.Check(removed.delta >= 0, "its delta's number is negative");
-    fields.List(message.num_ties, message.ties, removed.ties);
+    fields.List(message.num_ties, message.ties, removed.links);
   }
 };
 TESSERA_CODEC(RemovedInDelta, removed_keyframes_t);
