@@ -37,6 +37,7 @@ struct StepStatistics {
 struct StageStatus {
   std::string name;  // "tracker", "extractor_0"
   std::string host;
+  std::string version;  // of the program
   int32_t pid = 0;
   int64_t epoch_us = 0;  // when it started
   StageState state = StageState::kStarting;

@@ -1,6 +1,7 @@
 #include "runtime/bus.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "core/errors.h"
 #include "runtime/file_bus.h"
@@ -27,9 +28,7 @@ std::shared_ptr<Bus> OpenUdp(const std::string& url, int receive_buffer_bytes) {
     throw InputError("bus URL " + url +
                      " has no multicast group and port: write it like udpm://239.255.76.67:7667?ttl=0");
   }
-  if (const std::string problem = CheckUdp(*address); !problem.empty()) {
-    throw std::runtime_error(problem);
-  }
+  if (const Result<> usable = CheckUdp(*address); !usable) throw std::runtime_error(usable.error().sentence);
   // No more than the kernel grants: LCM would print a paragraph about the rest for each bus.
   const int granted = std::min(GrantedReceiveBuffer(receive_buffer_bytes), receive_buffer_bytes);
   const std::string asked = "recv_buf_size=" + std::to_string(granted);
@@ -42,7 +41,6 @@ std::shared_ptr<Bus> OpenUdp(const std::string& url, int receive_buffer_bytes) {
 std::shared_ptr<Bus> OpenBus(const std::string& url, int receive_buffer_bytes) {
   if (url.starts_with("file://")) return OpenFile(url);
   if (url.starts_with("udpm://")) return OpenUdp(url, receive_buffer_bytes);
-  if (url == "memq://") return std::make_shared<LcmBus>(url, 0);
   throw InputError("bus URL " + url + " is not known: write it like udpm://239.255.76.67:7667?ttl=0");
 }
 
@@ -59,9 +57,9 @@ std::string UrlOf(const Channel& channel, const Settings& settings) {
   }
   std::string url = settings.Get<std::string>("bus.tile_url");
   const int port = settings.Get<int>("bus.first_tile_port") + channel.extractor;
-  if (channel.extractor < 0 || channel.extractor >= kMaxExtractors || port < 1 || port > 65535) {
-    throw InputError("extractor " + std::to_string(channel.extractor) + " has no port: ids are 0 to " +
-                     std::to_string(kMaxExtractors - 1) + ", and bus.first_tile_port + id is at most 65535");
+  if (channel.extractor < 0 || channel.extractor >= kMaxExtractors) {
+    throw std::invalid_argument("extractor " + std::to_string(channel.extractor) + " has no bus: ids are 0 to " +
+                                std::to_string(kMaxExtractors - 1));
   }
   const std::string mark = "{port}";
   if (const size_t at = url.find(mark); at != std::string::npos) {

@@ -39,11 +39,11 @@ class Bus {
   virtual void Close() {}
 };
 
-// Opens "udpm://...", "file://PATH?mode=w" or "memq://". Throws InputError if the URL is none of them or the file can't
-// be written.
+// Opens "udpm://..." or "file://PATH?mode=w". Throws InputError if the URL is neither or the file can't be written, and
+// std::runtime_error if the network refuses.
 std::shared_ptr<Bus> OpenBus(const std::string& url, int receive_buffer_bytes);
 
-// The URL of the bus that the channel lives on. Throws InputError.
+// The URL of the bus that the channel lives on.
 std::string UrlOf(const Channel& channel, const Settings& settings);
 
 }  // namespace tessera

@@ -110,17 +110,17 @@ void IncomingStreams::AbandonRaw() {
   for (const auto& [channel, receiver] : raw_) receiver->Abandon();
 }
 
-void IncomingStreams::OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat) {
+void IncomingStreams::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat) {
   const int64_t now_us = clock_.NowUs();
   for (const StreamHead& head : heartbeat.streams) {
     for (const auto& subscription : subscriptions_) {
       if (subscription->receiver && subscription->channel == head.channel) {
-        subscription->receiver->OnHeartbeat(header.publisher, header.epoch_us, head, now_us);
+        subscription->receiver->OnHeartbeat(publisher, epoch_us, head, now_us);
       }
     }
     if (!raw_handler_) continue;
     if (ChannelReceiver* receiver = RawReceiver(head.channel)) {
-      receiver->OnHeartbeat(header.publisher, header.epoch_us, head, now_us);
+      receiver->OnHeartbeat(publisher, epoch_us, head, now_us);
     }
   }
 }

@@ -43,7 +43,7 @@ class IncomingStreams {
   // Hears nothing any more.
   void Close();
 
-  void OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat);
+  void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat);
   // To be called when no message waits: what has to be asked for now.
   std::vector<RepairRequest> Poll();
   // When Poll has something to do, by the clock; nullopt: not before something comes.

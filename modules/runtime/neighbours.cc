@@ -14,17 +14,18 @@ std::string Describe(const std::string& name, const std::string& host, int32_t p
 
 }  // namespace
 
-void Neighbours::OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat, int64_t now_us) {
-  if (header.epoch_us == own_.epoch_us && heartbeat.pid == own_.pid && heartbeat.host == own_.host) {
+void Neighbours::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat,
+                             int64_t now_us) {
+  if (epoch_us == own_.epoch_us && heartbeat.pid == own_.pid && heartbeat.host == own_.host) {
     return;
   }
   std::erase_if(neighbours_, [&](const auto& entry) { return now_us - entry.second.heard_us > kMemoryUs; });
-  const auto [begin, end] = neighbours_.equal_range(header.epoch_us);
+  const auto [begin, end] = neighbours_.equal_range(epoch_us);
   auto it = begin;
-  while (it != end && (it->second.name != header.publisher || it->second.pid != heartbeat.pid)) ++it;
+  while (it != end && (it->second.name != publisher || it->second.pid != heartbeat.pid)) ++it;
   if (it == end) {
     if (neighbours_.size() >= kMaxNeighbours) return;
-    it = neighbours_.emplace(header.epoch_us, Neighbour{header.publisher, heartbeat.host, heartbeat.pid, 0, {}});
+    it = neighbours_.emplace(epoch_us, Neighbour{publisher, heartbeat.host, heartbeat.pid, 0, {}});
   }
   it->second.heard_us = now_us;
   for (const StreamHead& stream : heartbeat.streams) {

@@ -16,7 +16,7 @@ class Neighbours {
  public:
   explicit Neighbours(const StageIdentity& own) : own_(own) {}
 
-  void OnHeartbeat(const MessageHeader& header, const Heartbeat& heartbeat, int64_t now_us);
+  void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat, int64_t now_us);
 
   // Of two processes in conflict the one that started later has to end. These give its sentence if that is this one,
   // and the other was heard of within the last second.

@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "core/errors.h"
+#include "core/version.h"
 #include "runtime/stage.h"
 #include "runtime/stage_engine.h"
 #include "runtime/udp_check.h"
@@ -154,6 +155,7 @@ int Live(const std::string& program, const Arguments& arguments,
   StageEngine::Setup setup = MakeSetup(arguments);
   CheckReceiveBuffer(setup.settings);
   StageEngine engine(std::move(setup));
+  spdlog::info("{} {}", program, kVersion);
   const int64_t two_heartbeats_us = 2 * engine.stream_settings_.heartbeat_us;
   if (CanListenAnywhere(engine)) RunFor(engine, two_heartbeats_us);  // who else is here?
   std::shared_ptr<void> stage;

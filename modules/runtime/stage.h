@@ -7,9 +7,10 @@
 //   int main(int argc, char** argv) { return tessera::RunStage<tessera::TrackerStage>("tracker", "Estimates ...", argc,
 //   argv); }
 //
-// Handlers and timers all run on one thread, one after the other. A handler may throw: the error is counted, logged
-// and published in STATUS, and the stage goes on; an InputError thrown by the constructor ends the process with
-// status 2, any other exception with 1.
+// Handlers, timers and idle tasks all run on one thread, one after the other. A message that can't be used is expected:
+// its handler returns a failed Result, which is counted, reported and passed over. What is thrown ends the process with
+// one sentence, since it may leave the stage half changed: an InputError with status 2, any other exception with 1.
+// STATUS says kFailed then, and the supervisor starts the process again like one that was killed.
 #pragma once
 
 #include <chrono>
@@ -100,7 +101,7 @@ class StageContext {
   bool fell_silent() const;
 
   // The stage has sent its last value. It stays to repair what others missed until it is told to stop (SIGTERM,
-  // SIGINT, end of a memq test), and says `kFinished` in its status.
+  // SIGINT), and says `kFinished` in its status.
   void Finish();
   bool finished() const;
 

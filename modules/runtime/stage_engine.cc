@@ -30,7 +30,8 @@ StageEngine::StageEngine(Setup setup)
       figures_(identity_),
       neighbours_(identity_),
       outgoing_(identity_, stream_settings_),
-      incoming_(stream_settings_, *clock_, [this](const std::string& sentence) { ReportError(sentence); }) {
+      incoming_(stream_settings_, *clock_, [this](const std::string& sentence) { ReportError(sentence); }),
+      root_(setup.root != nullptr ? setup.root : this) {
   talks_ = BusOf(kHeartbeat)->can_listen();
   heartbeat_due_us_ = status_due_us_ = clock_->NowUs();
   if (!talks_) return;
@@ -38,7 +39,7 @@ StageEngine::StageEngine(Setup setup)
   repair_stream_ = Advertise(kRepair);
   status_stream_ = Advertise(kStatus);
   const auto on_heartbeat = [this](const Heartbeat& heartbeat, const MessageInfo& info) {
-    OnHeartbeat(heartbeat, {.publisher = info.publisher, .epoch_us = info.epoch_us});
+    OnHeartbeat(heartbeat, info);
   };
   Subscribe(kHeartbeat, TypeName<Heartbeat>(), MakeReceiverOf<Heartbeat>(on_heartbeat), Listener::kEngine);
 }
@@ -124,7 +125,7 @@ void StageEngine::Subscribe(const Channel& channel, const char* type, MakeReceiv
 
 void StageEngine::Receive(const std::string& channel, ValueReceiver& receiver, Delivery delivery, ByteView message,
                           const MessageHeader& header, int64_t arrival_us) {
-  CallSafely("a value on " + channel, [&] {
+  CallStage("a value on " + channel, [&] {
     const Result<bool> is_whole = receiver.Receive(message, header, arrival_us);
     if (!is_whole) {
       incoming_.Refuse(channel, is_whole.error().sentence);
@@ -141,19 +142,19 @@ StageContext& StageEngine::Join(const std::string& channel_prefix) {
               .identity = identity_,
               .clock = clock_,
               .open_bus = [this](const std::string& url) { return BusAt(url); },
-              .log = log_};
+              .log = log_,
+              .root = root_};
   others_.push_back(std::make_unique<StageEngine>(std::move(setup)));
   others_.back()->state_ = state_;
   return others_.back()->context();
 }
 
 void StageEngine::SubscribeAll(IncomingStreams::RawHandler handler) {
-  const auto safely = [this, handler = std::move(handler)](const std::string& channel, ByteView message,
-                                                           int64_t arrival_us) {
-    if (stage_is_gone_) return;
-    CallSafely("a message on " + channel, [&] { handler(channel, message, arrival_us); });
-  };
-  incoming_.SetRawHandler(safely);
+  incoming_.SetRawHandler(
+      [this, handler = std::move(handler)](const std::string& channel, ByteView message, int64_t arrival_us) {
+        if (stage_is_gone_) return;
+        CallStage("a message on " + channel, [&] { handler(channel, message, arrival_us); });
+      });
   for (const Channel& channel : std::initializer_list<Channel>{kHeartbeat, kCamera, kTileFeatures}) {
     incoming_.AddAll(BusOf(channel));
   }
@@ -170,16 +171,16 @@ void StageEngine::ListenToExtractors(const Heartbeat& heartbeat) {
       continue;
     }
     if (extractor >= 0 && extractor < kMaxExtractors) {
-      CallSafely(head.channel, [&] { incoming_.AddAll(BusOf(TileTopic(extractor))); });
+      incoming_.AddAll(BusOf(TileTopic(extractor)));
     }
   }
 }
 
-void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header) {
+void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageInfo& info) {
   const int64_t now_us = clock_->NowUs();
-  neighbours_.OnHeartbeat(header, heartbeat, now_us);
+  neighbours_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat, now_us);
   if (incoming_.hears_all()) ListenToExtractors(heartbeat);
-  incoming_.OnHeartbeat(header, heartbeat);
+  incoming_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat);
   auto conflict = neighbours_.ConflictOverName(now_us);
   for (const StreamHead& head : heartbeat.streams) {
     if (!conflict && outgoing_.IsExclusive(head.channel)) {
@@ -231,11 +232,14 @@ void StageEngine::Fail(const std::string& sentence, int exit_status) {
   stopped_ = true;
 }
 
-void StageEngine::CallSafely(const std::string& where, const std::function<void()>& call) {
+void StageEngine::CallStage(const std::string& where, const std::function<void()>& call) {
+  if (is_over()) return;  // the rest of a burst behind what ended it
   try {
     call();
+  } catch (const InputError& error) {
+    root_->Fail(error.what(), 2);
   } catch (const std::exception& error) {
-    ReportError(where + ": " + error.what());
+    root_->Fail(where + " ended the process: " + error.what(), 1);
   }
 }
 
@@ -255,7 +259,7 @@ void StageEngine::RunTimers() {
     if (timers_[i].due_us > now_us) continue;
     timers_[i].due_us = now_us + timers_[i].period_us;
     const auto task = timers_[i].task;
-    CallSafely("a timer's task", task);
+    CallStage("a timer", task);
   }
   const int64_t now_us = clock_->NowUs();
   if (now_us >= std::min(heartbeat_due_us_, soon_due_us_)) SendHeartbeats();
@@ -266,7 +270,7 @@ bool StageEngine::RunIdleTasks() {
   bool again = false;
   for (size_t i = 0; i < idle_tasks_.size() && !stopped_; ++i) {  // by index: a task may add one
     const auto task = idle_tasks_[i];
-    CallSafely("the stage's main loop", [&] { again |= task(); });
+    CallStage("the stage's own work", [&] { again |= task(); });
   }
   return again;
 }

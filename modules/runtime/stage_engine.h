@@ -1,5 +1,5 @@
 // What stands behind a StageContext: buses, streams, timers and the stage's figures. RunStageMain drives it by the
-// computer's clock and poll(); MemoryBus by a clock of its own.
+// computer's clock and poll(), tests by a clock of their own.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +30,7 @@ class StageEngine {
     std::shared_ptr<const Clock> clock;
     std::function<std::shared_ptr<Bus>(const std::string& url)> open_bus;
     std::function<void(bool is_error, const std::string& sentence)> log;
+    StageEngine* root = nullptr;  // whose process this one is part of, under another prefix; null: its own
   };
   // Opens the main bus and listens there for who else is on it. Throws as OpenBus does.
   explicit StageEngine(Setup setup);
@@ -52,8 +53,8 @@ class StageEngine {
   StageContext& Join(const std::string& channel_prefix);
   void ReportError(const std::string& sentence);
   void Fail(const std::string& sentence, int exit_status);
-  // Runs `call`; reports what it throws.
-  void CallSafely(const std::string& where, const std::function<void()>& call);
+  // Runs code of the stage. What it throws ends the whole process, since the stage may be half changed.
+  void CallStage(const std::string& where, const std::function<void()>& call);
 
   // --- for who drives it ---
   // One round: handles messages that wait, runs what is due; when nothing waits any more, asks for what lacks and runs
@@ -99,18 +100,20 @@ class StageEngine {
 
  private:
   std::shared_ptr<Bus> BusAt(const std::string& url);
-  void OnHeartbeat(const Heartbeat& heartbeat, const MessageHeader& header);
+  void OnHeartbeat(const Heartbeat& heartbeat, const MessageInfo& info);
   void ListenToExtractors(const Heartbeat& heartbeat);
   void Receive(const std::string& channel, ValueReceiver& receiver, Delivery delivery, ByteView message,
                const MessageHeader& header, int64_t arrival_us);
   template <class Value>
   void SendValue(int stream, const Value& value);
+  bool is_over() const { return stopped_ || root_->stopped_; }
   bool HandleMessages();
   void RunTimers();
   void AskForRepairs();
   bool RunIdleTasks();
   void PartFromFailed();
 
+  StageEngine* const root_;
   bool talks_ = false;  // the main bus has listeners
   int heartbeat_stream_ = -1;
   int repair_stream_ = -1;

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <numeric>
 
+#include "core/version.h"
+
 namespace tessera {
 namespace {
 
@@ -50,6 +52,7 @@ StepStatistics StatisticsOf(std::vector<float> steps_ms) {
 StageFigures::StageFigures(const StageIdentity& identity) {
   status_.name = identity.name;
   status_.host = identity.host;
+  status_.version = kVersion;
   status_.pid = identity.pid;
   status_.epoch_us = identity.epoch_us;
 }

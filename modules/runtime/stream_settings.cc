@@ -4,6 +4,7 @@
 #include <cctype>
 
 #include "core/errors.h"
+#include "messages/topics.h"
 
 namespace tessera {
 namespace {
@@ -34,6 +35,8 @@ std::string GetPrefix(const Settings& settings) {
 StreamSettings StreamSettings::From(const Settings& settings) {
   StreamSettings result;
   result.channel_prefix = GetPrefix(settings);
+  // Each extractor has a port of its own.
+  GetBetween(settings, "bus.first_tile_port", 1, 65536 - kMaxExtractors);
   result.receive_buffer_bytes = GetBetween(settings, "bus.receive_buffer_bytes", 1 << 16, 1 << 30);
   // Above 65,499 bytes LCM would cut messages into fragments, whose loss nobody could repair one by one.
   result.max_message_bytes = static_cast<size_t>(GetBetween(settings, "bus.max_message_bytes", 1000, 65000));

@@ -65,22 +65,23 @@ int GrantedReceiveBuffer(int asked_bytes) {
   return granted / 2;  // the kernel reports double, for its own bookkeeping
 }
 
-std::string CheckUdp(const UdpAddress& address) {
+Result<> CheckUdp(const UdpAddress& address) {
   const std::string place = "UDP multicast group " + address.group + ", port " + std::to_string(address.port);
   const sockaddr_in socket_address = SocketAddress(address);
   UdpSocket udp;
   if (!udp.Set(SOL_SOCKET, SO_REUSEADDR, 1) ||
       bind(udp.descriptor(), reinterpret_cast<const sockaddr*>(&socket_address), sizeof(socket_address)) != 0) {
-    return place + " can't be used (" + std::strerror(errno) +
-           "): another program holds the port; end it, or set other ports in bus.*_url";
+    return Failed(place + " can't be used (" + std::strerror(errno) +
+                  "): another program holds the port; end it, or set other ports in bus.*_url");
   }
   const ip_mreq group{.imr_multiaddr = socket_address.sin_addr, .imr_interface = {.s_addr = htonl(INADDR_ANY)}};
   if (!udp.Set(IPPROTO_IP, IP_ADD_MEMBERSHIP, group) ||
       connect(udp.descriptor(), reinterpret_cast<const sockaddr*>(&socket_address), sizeof(socket_address)) != 0) {
-    return "no multicast route to " + place + " (" + std::strerror(errno) +
-           "): give loopback one with `sudo ip link set lo multicast on` and `sudo ip route add 224.0.0.0/4 dev lo`";
+    return Failed(
+        "no multicast route to " + place + " (" + std::strerror(errno) +
+        "): give loopback one with `sudo ip link set lo multicast on` and `sudo ip route add 224.0.0.0/4 dev lo`");
   }
-  return "";
+  return {};
 }
 
 }  // namespace tessera

@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "core/result.h"
+
 namespace tessera {
 
 struct UdpAddress {
@@ -18,7 +20,7 @@ std::optional<UdpAddress> ParseUdpUrl(const std::string& url);
 // The receive buffer that the kernel grants to a socket that asks for so many bytes.
 int GrantedReceiveBuffer(int asked_bytes);
 
-// Empty if the group can be joined and the port be shared, else one sentence that says why not and what to do.
-std::string CheckUdp(const UdpAddress& address);
+// Whether the group can be joined and the port be shared; if not, why, and what to do.
+Result<> CheckUdp(const UdpAddress& address);
 
 }  // namespace tessera

@@ -25,6 +25,7 @@ struct Codec<StageStatus> {
   static void Cut(const StageStatus& status, Message* message, size_t max_bytes, Emit emit) {
     message->name = Printable(status.name);
     message->host = Printable(status.host);
+    message->version = Printable(status.version);
     message->pid = status.pid;
     message->stage_epoch_us = status.epoch_us;
     message->state = static_cast<int8_t>(status.state);
@@ -54,6 +55,7 @@ struct Codec<StageStatus> {
   static std::string Join(const Message& message, StageStatus* status) {
     *status = {.name = message.name,
                .host = message.host,
+               .version = message.version,
                .pid = message.pid,
                .epoch_us = message.stage_epoch_us,
                .state = static_cast<StageState>(message.state),

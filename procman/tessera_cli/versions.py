@@ -20,9 +20,11 @@ def tessera_version() -> str:
 
 def collect_versions() -> dict[str, str]:
     """Names and versions, in the order in which to show them. What is unknown is left out."""
-    commit = _commit()
-    versions = _of_build(BUILD / "versions.json") | {
+    commit, built = _commit(), _of_build(BUILD / "versions.json")
+    built.pop("Tessera", None)  # of the build's time; the one below is of these sources
+    versions = {
         "Tessera": tessera_version() + (f", commit {commit}" if commit else ""),
+        **built,
         "Python": platform.python_version(),
         "system": f"{_system()}, Linux {platform.release()}",
         "CPU": f"{_cpu()}, {os.cpu_count()} cores",

@@ -1,5 +1,5 @@
-// Whole stages' worth of transport over memq://: values, losses, latecomers, failures.
-#include "runtime/memory_bus.h"
+// The engine of stages on a bus in memory: values, losses, latecomers, failures.
+#include "support/memory_bus.h"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "core/version.h"
 #include "support/example_values.h"
 
 namespace tessera {
@@ -234,22 +235,74 @@ TEST(JoinRobot, ANamesakeUnderOnePrefixSilencesOnlyThat) {
   EXPECT_FALSE(pool.fell_silent());
 }
 
-TEST(MemoryBus, AHandlerThatThrowsIsReportedAndTheStageGoesOn) {
-  MemoryBus bus(Defaults());
-  StageContext& stage = bus.AddContext("stage");
+// A stage that counts the ends it hears, and its last status.
+class CountingStage {
+ public:
+  explicit CountingStage(MemoryBus& bus) : bus_(bus) {
+    bus.AddContext("watcher").Subscribe(kStatus, [this](const StageStatus& heard) {
+      if (heard.name == "stage") status = heard;
+    });
+  }
+  void SendEnds(int num) {
+    const auto ends = bus_.AddContext("camera").Advertise(kEndOfStream);
+    for (int i = 0; i < num; ++i) ends.Publish({.stage = StageKind::kCamera, .num_frames = i});
+  }
+
+  StageContext& context() { return context_; }
   int num_handled = 0;
-  stage.Subscribe(kEndOfStream, [&](const EndOfStream&) {
-    if (++num_handled == 1) throw std::runtime_error("no idea what to do");
+  StageStatus status;
+
+ private:
+  MemoryBus& bus_;
+  StageContext& context_ = bus_.AddContext("stage");
+};
+
+TEST(MemoryBus, AValueThatIsRefusedIsCountedReportedAndPassedOver) {
+  MemoryBus bus(Defaults());
+  CountingStage stage(bus);
+  stage.context().Subscribe(kEndOfStream, [&](const EndOfStream& end) -> Result<> {
+    ++stage.num_handled;
+    return Require(end.num_frames != 1, "it has one frame");
   });
-  std::string last_error;
-  bus.AddContext("watcher").Subscribe(kStatus, [&](const StageStatus& status) {
-    if (status.name == "stage") last_error = status.last_error;
+  stage.SendEnds(3);
+  ASSERT_TRUE(bus.RunUntil([&] { return stage.num_handled == 3 && stage.status.num_received == 2; }));
+  EXPECT_EQ(stage.status.num_undecodable, 1);
+  EXPECT_NE(stage.status.last_error.find("it has one frame"), std::string::npos) << stage.status.last_error;
+  EXPECT_EQ(bus.exit_status("stage"), 0);
+}
+
+TEST(MemoryBus, AHandlerThatThrowsEndsTheProcess) {
+  MemoryBus bus(Defaults());
+  CountingStage stage(bus);
+  stage.context().Subscribe(kEndOfStream, [&](const EndOfStream&) {
+    ++stage.num_handled;
+    throw std::runtime_error("no idea what to do");
   });
-  const auto publisher = bus.AddContext("camera").Advertise(kEndOfStream);
-  publisher.Publish({.stage = StageKind::kCamera});
-  publisher.Publish({.stage = StageKind::kCamera});
-  ASSERT_TRUE(bus.RunUntil([&] { return num_handled == 2 && !last_error.empty(); }));
-  EXPECT_NE(last_error.find("no idea what to do"), std::string::npos);
+  stage.SendEnds(3);
+  ASSERT_TRUE(bus.RunUntil([&] { return stage.status.state == StageState::kFailed; }));
+  EXPECT_EQ(stage.num_handled, 1) << "what came behind is not handled by a stage that may be half changed";
+  EXPECT_EQ(bus.exit_status("stage"), 1);
+  EXPECT_NE(bus.failure("stage").find("no idea what to do"), std::string::npos);
+  EXPECT_EQ(stage.status.last_error, bus.failure("stage"));
+}
+
+TEST(MemoryBus, TimersAndIdleTasksThatThrowEndTheProcess) {
+  MemoryBus bus(Defaults());
+  bus.AddContext("timer").Every(std::chrono::milliseconds(10), [] { throw std::runtime_error("late"); });
+  bus.AddContext("worker").WhenIdle([]() -> bool { throw InputError("the disk is full"); });
+  bus.RunUntilQuiet();
+  EXPECT_EQ(bus.exit_status("timer"), 1);
+  EXPECT_EQ(bus.exit_status("worker"), 2);
+  EXPECT_EQ(bus.failure("worker"), "the disk is full");
+}
+
+TEST(JoinRobot, AHandlerThatThrowsEndsTheWholeProcess) {
+  MemoryBus bus(Defaults());
+  StageContext& pool = bus.AddContext("extractor_0");
+  pool.JoinRobot("a_").Subscribe(kEndOfStream, [](const EndOfStream&) { throw std::runtime_error("no idea"); });
+  const auto ends = bus.AddContext("dispatcher", 0, {"bus.channel_prefix=a_"}).Advertise(kEndOfStream);
+  ends.Publish({.stage = StageKind::kDispatcher});
+  ASSERT_TRUE(bus.RunUntil([&] { return bus.exit_status("extractor_0") == 1; }));
 }
 
 TEST(MemoryBus, MessagesOfAnotherTypeAreCounted) {
@@ -301,6 +354,7 @@ TEST(MemoryBus, StatusTellsOfTheStage) {
   EXPECT_NEAR(status.step.median_ms, 50.0, 1.0);
   EXPECT_NEAR(status.step.p95_ms, 95.0, 1.0);
   EXPECT_EQ(status.step.max_ms, 100.0);
+  EXPECT_EQ(status.version, kVersion);
   EXPECT_EQ(status.queue, 4);
   EXPECT_EQ(status.num_dropped, 2);
   ASSERT_EQ(status.values.size(), 1U);
@@ -324,8 +378,9 @@ TEST(MemoryBus, SameRunTwiceIsTheSame) {
 }
 
 TEST(StreamSettings, AreChecked) {
-  for (const char* assignment : {"bus.max_message_bytes=100", "bus.max_message_bytes=70000", "stream.history_bytes=0",
-                                 "stream.heartbeat_ms=0", "stream.repair_ms=0", "bus.channel_prefix=a b"}) {
+  for (const char* assignment :
+       {"bus.max_message_bytes=100", "bus.max_message_bytes=70000", "stream.history_bytes=0", "stream.heartbeat_ms=0",
+        "stream.repair_ms=0", "bus.first_tile_port=65000", "bus.channel_prefix=a b"}) {
     Settings settings = Defaults();
     settings.Override(assignment);
     MemoryBus bus(settings);

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "runtime/memory_bus.h"
 #include "stages/recorder/recorder_stage.h"
 #include "support/example_values.h"
+#include "support/memory_bus.h"
 #include "wire/codec.h"
 #include "wire/log_file.h"
 

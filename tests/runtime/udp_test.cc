@@ -67,18 +67,19 @@ TEST(Udp, APortThatIsTakenGivesASentence) {
   address.sin_family = AF_INET;
   address.sin_port = htons(17669);
   ASSERT_EQ(bind(other, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
-  const std::string problem = CheckUdp({.group = "239.255.76.67", .port = 17669});
+  const Result<> taken = CheckUdp({.group = "239.255.76.67", .port = 17669});
   close(other);
-  EXPECT_NE(problem.find("port 17669"), std::string::npos);
-  EXPECT_NE(problem.find("another program"), std::string::npos);
-  EXPECT_EQ(CheckUdp({.group = "239.255.76.67", .port = 17669}), "");
+  ASSERT_FALSE(taken);
+  EXPECT_NE(taken.error().sentence.find("port 17669"), std::string::npos);
+  EXPECT_NE(taken.error().sentence.find("another program"), std::string::npos);
+  EXPECT_TRUE(CheckUdp({.group = "239.255.76.67", .port = 17669}));
 }
 
 TEST(Udp, EachExtractorHasABusOfItsOwn) {
   const Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   EXPECT_NE(UrlOf(TileTopic(0), settings), UrlOf(TileTopic(1), settings));
   EXPECT_NE(UrlOf(TileTopic(3), settings).find(":7683?"), std::string::npos);
-  EXPECT_THROW(UrlOf(TileTopic(-1), settings), InputError);
+  EXPECT_THROW(UrlOf(TileTopic(-1), settings), std::invalid_argument);
 }
 
 }  // namespace

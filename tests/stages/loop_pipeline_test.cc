@@ -1,4 +1,4 @@
-// The whole pipeline with loop closer and global adjuster over memq:// in one process: a camera that is carried off,
+// The whole pipeline with loop closer and global adjuster in one process: a camera that is carried off,
 // begins another part of the map, and comes back.
 #include <gtest/gtest.h>
 
@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"
 #include "stages/extractor/extractor_stage.h"
@@ -20,6 +19,7 @@
 #include "stages/mapper/mapper_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
 #include "stages/tracker/tracker_stage.h"
+#include "support/memory_bus.h"
 #include "support/run_folder.h"
 #include "support/synthetic_images.h"
 

@@ -1,4 +1,4 @@
-// The whole pipeline with tracker, mapper and evaluator over memq:// in one process: the same two hashes whatever
+// The whole pipeline with tracker, mapper and evaluator in one process: the same two hashes whatever
 // happens on the way, and late listeners that reach the mapper's map.
 #include <gtest/gtest.h>
 
@@ -9,7 +9,6 @@
 
 #include "evaluation/map_text.h"
 #include "map/map.h"
-#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"
 #include "stages/extractor/extractor_stage.h"
@@ -17,6 +16,7 @@
 #include "stages/mapper/mapper_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
 #include "stages/tracker/tracker_stage.h"
+#include "support/memory_bus.h"
 #include "support/run_folder.h"
 #include "support/synthetic_images.h"
 

@@ -1,4 +1,4 @@
-// Dispatcher, extractors and reassembler together, over memq:// in one process, with losses and deaths.
+// Dispatcher, extractors and reassembler together in one process, with losses and deaths.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,10 +8,10 @@
 #include "features/selection.h"
 #include "features/tiling.h"
 #include "messages/tracking_types.h"
-#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
+#include "support/memory_bus.h"
 #include "support/synthetic_images.h"
 
 namespace tessera {

@@ -1,4 +1,4 @@
-// The whole pipeline, with a camera that plays a folder, over memq:// in one process: whichever stage is killed, and
+// The whole pipeline, with a camera that plays a folder, in one process: whichever stage is killed, and
 // whenever, the run ends with the same two hashes.
 #include <gtest/gtest.h>
 
@@ -10,7 +10,6 @@
 #include <string>
 
 #include "messages/tracking_types.h"
-#include "runtime/memory_bus.h"
 #include "stages/camera/camera_stage.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"
@@ -18,6 +17,7 @@
 #include "stages/mapper/mapper_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
 #include "stages/tracker/tracker_stage.h"
+#include "support/memory_bus.h"
 #include "support/run_folder.h"
 #include "support/synthetic_images.h"
 

@@ -1,4 +1,4 @@
-// Several robots and one pool of extractors, over memq:// in one process: what each gets is what it gets alone.
+// Several robots and one pool of extractors, in one process: what each gets is what it gets alone.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 #include "features/selection.h"
 #include "features/tiling.h"
 #include "messages/tracking_types.h"
-#include "runtime/memory_bus.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/extractor/extractor_stage.h"
 #include "stages/reassembler/reassembler_stage.h"
+#include "support/memory_bus.h"
 #include "support/synthetic_images.h"
 
 namespace tessera {

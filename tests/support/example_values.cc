@@ -500,7 +500,8 @@ bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
 
 template <>
 StageStatus DrawValue<StageStatus>(std::mt19937& generator, int size) {
-  StageStatus status{.name = "extractor_3", .host = "node", .pid = 77, .epoch_us = 1'700'000'000'000'000};
+  StageStatus status{
+      .name = "extractor_3", .host = "node", .version = "1.2.3", .pid = 77, .epoch_us = 1'700'000'000'000'000};
   status.state = static_cast<StageState>(Draw(generator, 0, 3));
   status.num_received = Draw(generator, 0, 999);
   status.num_published = Draw(generator, 0, 999);
@@ -531,8 +532,8 @@ bool AreSame(const StageStatus& a, const StageStatus& b) {
     return std::vector<double>{s.step.mean_ms, s.step.median_ms, s.step.p95_ms, s.step.p99_ms,
                                s.step.max_ms,  s.cpu_percent,    s.cpu_s,       s.rss_mb};
   };
-  return a.name == b.name && a.host == b.host && a.last_error == b.last_error && a.values == b.values &&
-         counts(a) == counts(b) && figures(a) == figures(b);
+  return a.name == b.name && a.host == b.host && a.version == b.version && a.last_error == b.last_error &&
+         a.values == b.values && counts(a) == counts(b) && figures(a) == figures(b);
 }
 
 template <>

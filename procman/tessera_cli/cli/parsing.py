@@ -1,13 +1,12 @@
-"""The argument parser of all commands, and types of arguments whose errors are told in one sentence."""
+"""The argument parser of all commands, and types of arguments whose errors are one sentence each."""
 
 import argparse
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn, TypeAlias
 
-if TYPE_CHECKING:
-    Commands = argparse._SubParsersAction["Parser"]
-
+# What subcommands are added to.
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 # Carries out a command and returns its exit status.
 Main = Callable[[argparse.Namespace], int]
 
@@ -19,7 +18,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"tessera: {message.removeprefix('argument ')}; {self.prog} --help explains the arguments.\n")
 
 
-def add_command(commands: "Commands", name: str, main: Main, summary: str, epilog: str = "") -> Parser:
+def add_command(commands: Commands, name: str, main: Main, summary: str, epilog: str = "") -> Parser:
     """A subcommand. `epilog` ends its help, with examples."""
     parser = commands.add_parser(
         name,

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_port
-from tessera_cli.cli.parsing import add_command, whole_number
+from tessera_cli.cli.parsing import Commands, add_command, whole_number
 from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT, absolute
 
 if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
     from tessera_cli.runs.run_folder import Result
 
 SCENE = "street-short"
@@ -38,7 +37,7 @@ RENDERED_BY = (
 SUFFIXES = (".cc", ".h", ".lcm")
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "demo",

@@ -1,12 +1,8 @@
 """tessera deploy: Tessera on other nodes."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 EPILOG = """\
 NODE is [USER@]HOST or [USER@]HOST:FOLDER; the default folder is `tessera` in the home folder. Copies what git
@@ -19,7 +15,7 @@ examples:
 """
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Copies the sources to nodes by ssh and rsync, and reports what each of them lacks."
     parser = add_command(commands, "deploy", main, summary, EPILOG)
     parser.add_argument("nodes", metavar="NODE", nargs="+", help="see below")

@@ -1,14 +1,10 @@
 """tessera deputy: the process that runs on each node of a LAN."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_lan
-from tessera_cli.cli.parsing import add_command
+from tessera_cli.cli.parsing import Commands, add_command
 from tessera_cli.files import PROCMAN
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
 
 EPILOG = """\
 It resumes its last orders when it is restarted. Ctrl-C or SIGTERM ends it and all its processes.
@@ -19,7 +15,7 @@ examples:
 """
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Runs on each node: starts, watches and ends processes that signed orders name."
     parser = add_command(commands, "deputy", main, summary, EPILOG)
     parser.add_argument("--id", metavar="NAME", help="default: the name of this machine")

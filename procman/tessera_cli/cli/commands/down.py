@@ -1,16 +1,12 @@
 """tessera down: ends process lists."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_lan, add_timeout
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Stops all processes of one list, or of all lists."
     examples = "examples:\n  procman/tessera down\n  procman/tessera down robot_a\n"
     parser = add_command(commands, "down", main, summary, examples)

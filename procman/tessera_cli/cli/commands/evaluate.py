@@ -1,12 +1,8 @@
 """tessera evaluate: the error of runs or trajectory files."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 EPILOG = """\
 Files hold TUM rows `timestamp tx ty tz qx qy qz qw` or KITTI rows of 12 numbers.
@@ -18,7 +14,7 @@ examples:
 """
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Error of runs or trajectory files against ground truth, by the evo package."
     parser = add_command(commands, "evaluate", main, summary, EPILOG)
     parser.usage = "procman/tessera evaluate RUN|TRAJECTORY ... [GROUND_TRUTH] [options]"

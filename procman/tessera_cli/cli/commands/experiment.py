@@ -1,16 +1,12 @@
 """tessera experiment: measurements."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
-from tessera_cli.cli.parsing import add_command
+from tessera_cli.cli.parsing import Commands, add_command
 from tessera_cli.errors import UserError
 
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
 
-
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "experiment",

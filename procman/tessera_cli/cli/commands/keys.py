@@ -3,15 +3,14 @@
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from tessera_cli.cli.parsing import Parser, add_command
+from tessera_cli.cli.parsing import Commands, Parser, add_command
 from tessera_cli.console import say
 
 if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
     from tessera_cli.cluster.keys import KeyRing
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "keys",

@@ -1,16 +1,12 @@
 """tessera log: the output of a process on any node."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_lan
-from tessera_cli.cli.parsing import add_command, whole_number
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command, whole_number
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "The last lines that a process wrote, from its node."
     parser = add_command(commands, "log", main, summary, "examples:\n  procman/tessera log tracker --follow\n")
     parser.add_argument("name", metavar="[LIST/]NAME", help="of the process, as `tessera status` shows it")

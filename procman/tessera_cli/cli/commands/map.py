@@ -1,13 +1,9 @@
 """tessera map: the map of a running stack as a point cloud."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_lan
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 EPILOG = """\
 Any viewer of point clouds opens the file: MeshLab, CloudCompare, Blender.
@@ -19,7 +15,7 @@ examples:
 """
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Joins a running stack and writes its map as a point cloud (PLY)."
     parser = add_command(commands, "map", main, summary, EPILOG)
     parser.add_argument("path", metavar="OUT.ply", help="the file to write")

@@ -1,16 +1,12 @@
 """tessera record: a source into a log."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import SOURCES, add_source_options
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "record",

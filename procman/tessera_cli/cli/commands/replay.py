@@ -1,17 +1,13 @@
 """tessera replay: the whole stack on this machine, fed by a recorded log."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.commands import run
 from tessera_cli.cli.options import add_run_options
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "replay",

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import SOURCES, add_run_options
-from tessera_cli.cli.parsing import add_command
+from tessera_cli.cli.parsing import Commands, add_command
 
 if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
     from tessera_cli.runs.run_folder import Result
 
 EXAMPLES = """
@@ -20,7 +19,7 @@ examples:
 """
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "The whole stack on this machine, until the source ends or Ctrl-C."
     parser = add_command(commands, "run", main, summary, SOURCES + EXAMPLES)
     parser.add_argument("source", metavar="SOURCE", help="see below")

@@ -2,20 +2,16 @@
 
 import os
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_port
-from tessera_cli.cli.parsing import add_command
+from tessera_cli.cli.parsing import Commands, add_command
 from tessera_cli.console import say
 from tessera_cli.constants import PORT_OFFSETS
 from tessera_cli.errors import RunError
 from tessera_cli.files import BUILD, ROOT
 
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
 
-
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary, examples = "lcm-spy with Tessera's message types.", "examples:\n  procman/tessera spy --bus camera\n"
     parser = add_command(commands, "spy", main, summary, examples)
     parser.add_argument("--bus", choices=tuple(PORT_OFFSETS), default="main", help="default main")

@@ -1,16 +1,12 @@
 """tessera status: what runs where."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import add_lan
-from tessera_cli.cli.parsing import add_command
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Nodes and processes, once; exit status 1 if one has failed."
     parser = add_command(commands, "status", main, summary, "examples:\n  procman/tessera status --json\n")
     parser.add_argument("--json", action="store_true", help="for programs")

@@ -1,14 +1,10 @@
 """tessera up: a process list on its nodes."""
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.commands.run import present
 from tessera_cli.cli.options import add_lan, add_settings, add_timeout
-from tessera_cli.cli.parsing import add_command, command_count
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
+from tessera_cli.cli.parsing import Commands, add_command, command_count
 
 EPILOG = """\
 Exit status: 0 all are ready (or the script ended well), 1 one failed or was not ready in time, 2 the list or the
@@ -21,7 +17,7 @@ examples:
 """
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     summary = "Starts the processes of a list on their nodes and waits until all are ready."
     parser = add_command(commands, "up", main, summary, EPILOG)
     parser.add_argument("file", metavar="FILE", help="a process list, such as procman/lan.pmd")

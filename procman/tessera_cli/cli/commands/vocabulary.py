@@ -3,15 +3,11 @@
 import argparse
 import subprocess
 from argparse import Namespace
-from typing import TYPE_CHECKING
 
 from tessera_cli.cli.options import SOURCES, add_features
-from tessera_cli.cli.parsing import Parser, add_command, whole_number
+from tessera_cli.cli.parsing import Commands, Parser, add_command, whole_number
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.files import BIN, absolute
-
-if TYPE_CHECKING:
-    from tessera_cli.cli.parsing import Commands
 
 EPILOG = """\
 examples:
@@ -22,7 +18,7 @@ examples:
 PASSED_ON = ("every", "views", "features", "children", "levels", "seed")
 
 
-def add_parser(commands: "Commands") -> None:
+def add_parser(commands: Commands) -> None:
     parser = add_command(commands, "vocabulary", main, "Vocabularies of binary words for place recognition.", EPILOG)
     actions = parser.add_subparsers(metavar="train|info", required=True, dest="action", parser_class=Parser)
     train = actions.add_parser(

@@ -1,10 +1,10 @@
-#include "runtime/memory_bus.h"
+#include "support/memory_bus.h"
 
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
-#include "runtime/bus.h"
+#include "runtime/lcm_bus.h"
 #include "runtime/stage_engine.h"
 
 namespace tessera {
@@ -26,26 +26,26 @@ using Loses = std::function<bool(const std::string& channel)>;
 class TestBus : public Bus {
  public:
   TestBus(std::shared_ptr<const TestClock> clock, std::shared_ptr<const Loses> loses)
-      : clock_(std::move(clock)), loses_(std::move(loses)), bus_(OpenBus("memq://", 0)) {}
+      : clock_(std::move(clock)), loses_(std::move(loses)), bus_("memq://", 0) {}
 
   bool Publish(const std::string& channel, ByteView message, std::optional<int64_t> source_us) override {
-    return (*loses_ && (*loses_)(channel)) || bus_->Publish(channel, message, source_us);
+    return (*loses_ && (*loses_)(channel)) || bus_.Publish(channel, message, source_us);
   }
   bool can_listen() const override { return true; }
   void Subscribe(const void* owner, const std::string& channel, Handler handler) override {
-    bus_->Subscribe(owner, channel,
-                    [clock = clock_, handler = std::move(handler)](const std::string& name, ByteView message, int64_t) {
-                      handler(name, message, clock->WallUs());
-                    });
+    bus_.Subscribe(owner, channel,
+                   [clock = clock_, handler = std::move(handler)](const std::string& name, ByteView message, int64_t) {
+                     handler(name, message, clock->WallUs());
+                   });
   }
-  void Unsubscribe(const void* owner) override { bus_->Unsubscribe(owner); }
-  int file_descriptor() const override { return bus_->file_descriptor(); }
-  bool HandleOne() override { return bus_->HandleOne(); }
+  void Unsubscribe(const void* owner) override { bus_.Unsubscribe(owner); }
+  int file_descriptor() const override { return bus_.file_descriptor(); }
+  bool HandleOne() override { return bus_.HandleOne(); }
 
  private:
   std::shared_ptr<const TestClock> clock_;
   std::shared_ptr<const Loses> loses_;
-  std::shared_ptr<Bus> bus_;
+  LcmBus bus_;
 };
 
 }  // namespace
@@ -54,6 +54,7 @@ struct MemoryBus::Impl {
   struct Member {
     std::unique_ptr<StageEngine> engine;
     std::shared_ptr<void> stage;  // ends before its engine
+    bool has_ended = false;       // the stage failed, and has said so
   };
   // One round of all stages; moves the clock to the next thing that is due if none did anything.
   void Step();
@@ -73,8 +74,11 @@ void MemoryBus::Impl::Step() {
   int64_t due_us = INT64_MAX;
   for (Member& member : members) {
     StageEngine& engine = *member.engine;
+    if (member.has_ended) continue;
     if (engine.stopped_) {
+      engine.SendStatus(true);
       engine.Silence();
+      member.has_ended = true;
       continue;
     }
     did_something |= engine.Step();

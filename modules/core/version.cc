@@ -1,0 +1,7 @@
+#include "core/version.h"
+
+namespace tessera {
+
+const char* const kVersion = TESSERA_VERSION;
+
+}  // namespace tessera
