@@ -1,4 +1,4 @@
-// Time as transport sees it: the computer's, or that of a test.
+// Time as the runtime sees it: the computer's, or that of a test.
 #pragma once
 
 #include <cstdint>

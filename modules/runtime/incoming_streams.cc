@@ -16,8 +16,8 @@ bool IsOneOf(const WireType* type, std::initializer_list<const char*> names) {
 }  // namespace
 
 IncomingStreams::IncomingStreams(const StreamSettings& settings, const Clock& clock,
-                                 std::function<void(const std::string&)> complain)
-    : settings_(settings), clock_(clock), complain_(std::move(complain)) {}
+                                 std::function<void(const std::string&)> report)
+    : settings_(settings), clock_(clock), report_(std::move(report)) {}
 
 IncomingStreams::~IncomingStreams() { Close(); }
 
@@ -35,7 +35,7 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   } else {
     StreamReceiverOptions options = settings_.receiver;
     options.starts_now = channel.delivery == Delivery::kFromNow;
-    options.discards_at_restart = true;  // a frame behind one that lacks would be taken for the next
+    options.discards_at_restart = true;  // a frame behind a missing one would be taken for the next
     subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
   }
   bus->Subscribe(this, settings_.channel_prefix + channel.name,
@@ -54,13 +54,13 @@ void IncomingStreams::OnMessage(const Subscription& subscription, ByteView messa
   } else if (!subscription.receiver) {
     subscription.sink.deliver(message, *header, arrival_us);
   } else if (!subscription.receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
-    Refuse(subscription.channel, "its number " + std::to_string(header->sequence) + " can't be true");
+    Refuse(subscription.channel, "its number " + std::to_string(header->sequence) + " is implausible");
   }
 }
 
 void IncomingStreams::Refuse(const std::string& channel, const std::string& problem) {
   ++num_undecodable_;
-  complain_("a message on " + channel + " is refused: " + problem);
+  report_("a message on " + channel + " is refused: " + problem);
 }
 
 void IncomingStreams::AddAll(const std::shared_ptr<Bus>& bus) {
@@ -99,8 +99,8 @@ ChannelReceiver* IncomingStreams::RawReceiver(const std::string& channel) {
       .lose =
           [this, channel](const std::string& publisher, int64_t num_messages) {
             if (num_messages > 0) {
-              complain_("the recording lacks " + std::to_string(num_messages) + " messages of " + publisher + " on " +
-                        channel + ": nobody could send them again");
+              report_("the recording lacks " + std::to_string(num_messages) + " messages of " + publisher + " on " +
+                      channel + ": no publisher has them any longer");
             }
           }};
   return (raw_[channel] = std::make_unique<ChannelReceiver>(channel, settings_.receiver, sink)).get();

@@ -19,8 +19,8 @@ namespace tessera {
 
 class IncomingStreams {
  public:
-  // `complain` gets one sentence for each message that makes no sense.
-  IncomingStreams(const StreamSettings& settings, const Clock& clock, std::function<void(const std::string&)> complain);
+  // `report` gets one sentence for each message that is refused or lost.
+  IncomingStreams(const StreamSettings& settings, const Clock& clock, std::function<void(const std::string&)> report);
   ~IncomingStreams();
   IncomingStreams(const IncomingStreams&) = delete;
   IncomingStreams& operator=(const IncomingStreams&) = delete;
@@ -37,10 +37,10 @@ class IncomingStreams {
   void AddAll(const std::shared_ptr<Bus>& bus);
   bool hears_all() const { return raw_handler_ != nullptr; }
 
-  // The recording ends: gives on what waits behind gaps, and complains of the gaps.
+  // The recording ends: delivers what waits behind gaps, and reports the gaps.
   void AbandonRaw();
 
-  // Hears nothing any more.
+  // Unsubscribes from everything.
   void Close();
 
   void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat);
@@ -68,7 +68,7 @@ class IncomingStreams {
 
   const StreamSettings settings_;
   const Clock& clock_;
-  std::function<void(const std::string&)> complain_;
+  std::function<void(const std::string&)> report_;
   std::vector<std::shared_ptr<Bus>> buses_;  // that are subscribed to
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
   RawHandler raw_handler_;  // set while everything is recorded

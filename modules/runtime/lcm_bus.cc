@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-// A receiver is reckoned to empty its buffer in this time: LCM's own thread does nothing else.
+// A receiver is expected to empty its buffer in this time: LCM's own thread does nothing else.
 constexpr double kDrainSeconds = 0.002;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A bus that is an LCM instance (udpm, memq).
+// A bus that is an LCM instance.
 #pragma once
 
 #include <lcm/lcm.h>
@@ -45,7 +45,7 @@ class LcmBus : public Bus {
   int file_descriptor_ = -1;
   std::map<std::string, std::unique_ptr<Topic>> topics_;  // by channel; "": all
   size_t burst_bytes_;
-  double recent_bytes_ = 0.0;  // sent and, it is reckoned, not yet taken out of the receivers' buffers
+  double recent_bytes_ = 0.0;  // sent and, by estimate, not yet taken out of the receivers' buffers
   std::chrono::steady_clock::time_point paced_;
 };
 

@@ -45,7 +45,7 @@ class OutgoingStreams {
   // How far the repaired streams have come, in lots that each fit one message.
   std::vector<Heartbeat> MakeHeartbeats() const;
   const Channel& channel(int stream) const { return streams_[static_cast<size_t>(stream)].channel; }
-  // Whether channel `channel` is sent here, and nobody else may send on it.
+  // Whether channel `channel` is sent here, and no other process may send on it.
   bool IsExclusive(const std::string& channel) const;
 
  private:

@@ -132,12 +132,11 @@ bool CanListenAnywhere(const StageEngine& engine) {
 void RunUntilStopped(StageEngine& engine) {
   while (!told_to_stop && !engine.stopped_) {
     if (!engine.Step()) Wait(engine);
-    if (engine.context().finished() && !CanListenAnywhere(engine))
-      break;  // writing a log: nobody will ask for anything
+    if (engine.context().finished() && !CanListenAnywhere(engine)) break;  // writing a log: there are no subscribers
   }
 }
 
-// A recorder that is told to stop first gets what is on its way, and asks for what lacks, as long as there is hope.
+// A recorder that is told to stop first receives what is under way, and asks for what is missing, for a limited time.
 void CompleteRecording(StageEngine& engine) {
   constexpr int64_t kLongestUs = 2'000'000;
   RunFor(engine, 2 * engine.stream_settings_.heartbeat_us);  // a tail that got lost is known then
@@ -157,11 +156,11 @@ int Live(const std::string& program, const Arguments& arguments,
   StageEngine engine(std::move(setup));
   spdlog::info("{} {}", program, kVersion);
   const int64_t two_heartbeats_us = 2 * engine.stream_settings_.heartbeat_us;
-  if (CanListenAnywhere(engine)) RunFor(engine, two_heartbeats_us);  // who else is here?
+  if (CanListenAnywhere(engine)) RunFor(engine, two_heartbeats_us);  // hear of other processes
   std::shared_ptr<void> stage;
   if (!engine.stopped_) {
     stage = make_stage(engine.context());
-    engine.BeginToRun();  // who waits for it to run need not wait for the next regular one
+    engine.BeginToRun();  // at once, for those that wait for it to run
     RunUntilStopped(engine);
     if (engine.incoming_.hears_all()) CompleteRecording(engine);
   }

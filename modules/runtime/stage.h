@@ -39,7 +39,7 @@ class Publisher {
  public:
   Publisher() = default;
   void Publish(const Value& value) const;
-  // What was published so far interests nobody any more: it is not kept for repair.
+  // What was published so far is not needed any longer: it is not kept for repair.
   void Forget() const;
 
  private:
@@ -95,8 +95,8 @@ class StageContext {
 
   // This process under another robot's channel prefix: channels, streams, STATUS, HEARTBEAT and REPAIR of its own, on
   // the same buses, thread and clock. It lives as long as this context. If another process of this name is there
-  // already, it falls silent, which is an error here, and this context goes on: so it had better listen for two
-  // heartbeats before it advertises. Throws InputError if the prefix can't be one.
+  // already, the joined context falls silent, which is reported here, and this one continues: so it should listen for
+  // two heartbeats before it advertises. Throws InputError if the prefix can't be one.
   StageContext& JoinRobot(const std::string& channel_prefix);
   bool fell_silent() const;
 
@@ -105,7 +105,7 @@ class StageContext {
   void Finish();
   bool finished() const;
 
-  // Ends the process's loop with this exit status after one sentence. Nothing but a last status is sent any more.
+  // Ends the process's loop with this exit status after one sentence. Only a last status is sent after that.
   void Fail(const std::string& sentence, int exit_status = 1);
 
   // Own figures for STATUS.

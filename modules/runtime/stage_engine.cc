@@ -108,7 +108,7 @@ void StageEngine::Subscribe(const Channel& channel, const char* type, MakeReceiv
                   make_receiver = std::move(make_receiver)](ByteView message, const MessageHeader& header,
                                                             int64_t arrival_us) {
     if (listener == Listener::kStage && stage_is_gone_) return;
-    if (receivers->size() > kMaxPublishers) receivers->clear();  // made-up names
+    if (receivers->size() > kMaxPublishers) receivers->clear();  // forged names
     std::unique_ptr<ValueReceiver>& receiver = (*receivers)[header.publisher];
     if (!receiver) receiver = make_receiver();
     Receive(name, *receiver, delivery, message, header, arrival_us);
@@ -281,7 +281,7 @@ void StageEngine::AskForRepairs() {
   }
 }
 
-// One robot's namesake of this process is no reason to fail the others.
+// A process of the same name under one robot's prefix does not end the work for the other robots.
 void StageEngine::PartFromFailed() {
   for (const auto& other : others_) {
     StageEngine& engine = *other;

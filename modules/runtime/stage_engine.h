@@ -32,7 +32,7 @@ class StageEngine {
     std::function<void(bool is_error, const std::string& sentence)> log;
     StageEngine* root = nullptr;  // whose process this one is part of, under another prefix; null: its own
   };
-  // Opens the main bus and listens there for who else is on it. Throws as OpenBus does.
+  // Opens the main bus and listens there for other processes. Throws as OpenBus does.
   explicit StageEngine(Setup setup);
   StageEngine(const StageEngine&) = delete;
   StageEngine& operator=(const StageEngine&) = delete;
@@ -46,7 +46,7 @@ class StageEngine {
   int Advertise(const Channel& channel);
   using Encoder = std::function<std::vector<Bytes>(const MessageHeader& first, size_t max_bytes)>;
   void Send(int stream, const Encoder& encode, std::optional<int64_t> source_us);
-  // A listening stage hears nothing any more when it is gone; the engine's own subscriptions continue.
+  // A stage that is gone receives nothing; the engine's own subscriptions continue.
   enum class Listener { kEngine, kStage };
   void Subscribe(const Channel& channel, const char* type, MakeReceiver make_receiver, Listener listener);
   void SubscribeAll(IncomingStreams::RawHandler handler);
@@ -56,19 +56,19 @@ class StageEngine {
   // Runs code of the stage. What it throws ends the whole process, since the stage may be half changed.
   void CallStage(const std::string& where, const std::function<void()>& call);
 
-  // --- for who drives it ---
-  // One round: handles messages that wait, runs what is due; when nothing waits any more, asks for what lacks and runs
+  // --- for its driver ---
+  // One round: handles messages that wait, runs what is due; when none waits, asks for what is missing and runs
   // idle tasks. False if there is nothing left to do before something arrives or NextDueUs().
   bool Step();
   int64_t NextDueUs() const;
-  // The stage stands: says so.
+  // The stage has been made: STATUS says that it runs.
   void BeginToRun();
   // Values sent and received, but for what stages say of themselves; under all prefixes.
   int64_t num_values() const;
   std::vector<std::shared_ptr<Bus>> buses() const;
   void SendHeartbeats();
   void SendStatus(bool is_final);
-  // Ends silently: neither hears nor says anything any more.
+  // Ends silently: receives and sends nothing from now on.
   void Silence();
   // The stage is about to be destroyed: none of its tasks and handlers is called again.
   void ForgetStage();

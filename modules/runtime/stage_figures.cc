@@ -70,6 +70,7 @@ void StageFigures::SetValue(const std::string& name, double value) {
 StageStatus StageFigures::MakeStatus(StageState state, const StreamCounts& counts, int64_t num_undecodable,
                                      int64_t now_us, bool is_final) {
   constexpr int64_t kStatisticsPeriodUs = 1'000'000;
+  constexpr size_t kMaxSentenceLength = 300;  // so that a status is one message also on a LAN
   const double cpu_s = CpuSeconds();
   const double elapsed_s = 1e-6 * static_cast<double>(now_us - status_us_);
   if (elapsed_s > 0.01) {
@@ -90,7 +91,7 @@ StageStatus StageFigures::MakeStatus(StageState state, const StreamCounts& count
   status_.num_undecodable = num_undecodable;
   status_.queue = queue;
   status_.rss_mb = ResidentMb();
-  status_.last_error = last_error;
+  status_.last_error = last_error.substr(0, kMaxSentenceLength);
   return status_;
 }
 

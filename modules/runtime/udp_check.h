@@ -1,4 +1,4 @@
-// Looks at the network before LCM uses it, since LCM says little about what it lacks.
+// Checks the network before LCM uses it, since LCM says little about what is missing.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,7 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaxPublishers = 2048;  // of one channel; more are made-up names
+constexpr size_t kMaxPublishers = 2048;  // of one channel; names beyond that are forged
 
 }  // namespace
 
@@ -40,7 +40,7 @@ StreamReceiver* ChannelReceiver::Find(const std::string& publisher, int64_t epoc
 bool ChannelReceiver::OnMessage(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us) {
   StreamReceiver* receiver = Find(header.publisher, header.epoch_us);
   if (receiver == nullptr) {
-    return streams_.contains(header.publisher);  // the straggler of an epoch that is over makes sense
+    return streams_.contains(header.publisher);  // a late message of an earlier epoch is no error
   }
   return receiver->OnMessage(header, message, arrival_us, now_us);
 }

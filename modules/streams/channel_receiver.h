@@ -32,7 +32,7 @@ class ChannelReceiver {
   std::vector<RepairRequest> Poll(int64_t now_us);
   std::optional<int64_t> next_poll_us() const;
 
-  // All streams are over: gives on what is there, counts what lacks.
+  // All streams are over: delivers what has arrived and counts what is missing.
   void Abandon();
 
   const std::string& channel() const { return channel_; }

@@ -6,7 +6,7 @@
 namespace tessera {
 namespace {
 
-// A message this far ahead of all that is known of its stream is taken for nonsense.
+// A message this far ahead of all that is known of its stream is refused.
 constexpr int64_t kMaxAhead = int64_t{1} << 20;
 
 }  // namespace
@@ -60,7 +60,8 @@ void StreamReceiver::OnHeartbeat(int64_t first, int64_t next, int64_t now_us) {
     return;
   }
   Start(options_.starts_now ? next : first);
-  NoteGap(0, now_us);  // what was sent before this subscriber came is not on its way: no reason to wait for it
+  NoteGap(0,
+          now_us);  // what was sent before this subscriber existed will not arrive by itself: it is asked for at once
 }
 
 void StreamReceiver::Start(int64_t sequence) {

@@ -1,4 +1,4 @@
-// A subscriber's end of one stream: gives the messages on in order, each once, and says which ones to ask for again.
+// A subscriber's end of one stream: delivers the messages in order, each once, and says which ones to ask for again.
 // It knows no network and no clock: time is passed in.
 #pragma once
 
@@ -26,7 +26,7 @@ struct StreamReceiverOptions {
   int max_asked = 32;              // messages asked for at a time, so that the answer fits the receive buffer
   size_t max_waiting_bytes = size_t{1} << 26;  // kept behind a gap; what comes beyond is dropped and asked for again
   bool starts_now = false;  // begin with what is sent from now on, not with what the publisher still has
-  // What waits behind a gap when the publisher is started again is not given on: its successor sends it again.
+  // What waits behind a gap when the publisher is started again is not delivered: its successor sends it again.
   bool discards_at_restart = false;
 };
 
@@ -44,18 +44,18 @@ class StreamReceiver {
   };
   StreamReceiver(const StreamReceiverOptions& options, Sink sink);
 
-  // A message of the stream came. False if its number can't be true (far beyond all that is known).
+  // A message of the stream came. False if its number is implausible (far beyond all that is known).
   bool OnMessage(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us);
   // The publisher says that it has messages first .. next - 1.
   void OnHeartbeat(int64_t first, int64_t next, int64_t now_us);
 
-  // To be called when nothing that came waits to be handled: what still lacks then has been lost, or is late. Returns
+  // To be called when no message waits to be handled: what is still missing then was lost, or is late. Returns
   // the messages to ask for now; may give some up.
   std::vector<SequenceRange> Poll(int64_t now_us);
   // When Poll has something to do; nullopt: not before something comes.
   std::optional<int64_t> next_poll_us() const;
 
-  // The stream is over: gives on what is there, counts what lacks.
+  // The stream is over: delivers what has arrived and counts what is missing.
   void Abandon();
 
   const StreamCounts& counts() const { return counts_; }

@@ -1,7 +1,5 @@
 #include "wire/codec_impl.h"
 
-#include <algorithm>
-
 namespace tessera {
 namespace {
 
@@ -27,14 +25,6 @@ void PatchNumParts(const std::string& publisher, int32_t num_parts, Bytes* messa
   for (int shift = 24; shift >= 0; shift -= 8) {
     *at++ = static_cast<uint8_t>(static_cast<uint32_t>(num_parts) >> shift);
   }
-}
-
-std::string Printable(const std::string& text) {
-  std::string printable = text;
-  std::replace_if(
-      printable.begin(), printable.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; },
-      ' ');
-  return printable;
 }
 
 std::optional<MessageHeader> ReadHeader(ByteView message) {

@@ -1,17 +1,9 @@
-// What every codec has in common. A codec_*.cc file defines, for each of its values,
-//
-//   template <> struct Codec<Value> {
-//     using Message = ...;                       // generated type
-//     static constexpr const char* kTypeName;
-//     // Calls emit(message) for each part; no message may get larger than max_bytes. The header is set by the caller.
-//     template <class Emit> static void Cut(const Value& value, Message* message, size_t max_bytes, Emit emit);
-//     // Takes one part in; the first sets *value anew. Empty, or what is wrong with it.
-//     static std::string Join(const Message& message, Value* value);
-//   };
-//
-// and then says TESSERA_CODEC(Value).
+// Encodes and decodes values by the layouts of their messages. A codec_*.cc file defines the layouts (layout.h) and
+// then says, for each value, TESSERA_CODEC(Value, message_t).
 #pragma once
 
+#include <algorithm>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -20,18 +12,22 @@
 
 #include "tessera/header_t.hpp"
 #include "wire/codec.h"
+#include "wire/layout.h"
+#include "wire/part_reader.h"
+#include "wire/part_writer.h"
 #include "wire/wire_type.h"
 
 namespace tessera {
 
+// The type of the messages that carry a value.
 template <class Value>
-struct Codec;
+struct Carrier;
+template <class Value>
+using MessageOf = typename Carrier<Value>::Message;
 
 void SetHeader(const MessageHeader& header, header_t* message_header);
 // Writes num_parts into an encoded message whose header has this publisher.
 void PatchNumParts(const std::string& publisher, int32_t num_parts, Bytes* message);
-// Texts on the wire have no control characters.
-std::string Printable(const std::string& text);
 
 template <class Message>
 Bytes EncodeMessage(const Message& message) {
@@ -51,34 +47,55 @@ bool DecodeMessage(ByteView bytes, Message* message) {
 
 template <class Value>
 const char* TypeName() {
-  return Codec<Value>::kTypeName;
+  return MessageOf<Value>::getTypeName();
+}
+
+// A layout that says kIsOnePart has values of which only what fits into one message is sent.
+template <class Message>
+constexpr bool IsOnePart() {
+  return requires { Layout<Message>::kIsOnePart; };
 }
 
 template <class Value>
 std::vector<Bytes> EncodeValue(const Value& value, const MessageHeader& first, size_t max_bytes) {
+  using Message = MessageOf<Value>;
   std::vector<Bytes> parts;
   MessageHeader header = first;
   header.part = 0;
-  typename Codec<Value>::Message message{};
+  Message message{};
   SetHeader(header, &message.header);
-  Codec<Value>::Cut(value, &message, max_bytes, [&](const typename Codec<Value>::Message& part) {
-    parts.push_back(EncodeMessage(part));
+  PartWriter writer;
+  writer.BeginEmptyPart();
+  Layout<Message>::Describe(writer, message, value);
+  const auto overhead = static_cast<size_t>(message.getEncodedSize());
+  do {
+    writer.BeginPart(max_bytes - std::min(max_bytes, overhead));
+    Layout<Message>::Describe(writer, message, value);
+    parts.push_back(EncodeMessage(message));
     ++header.part;
     ++header.sequence;
     SetHeader(header, &message.header);
-  });
+  } while (!writer.done() && !IsOnePart<Message>());
   if (parts.size() > 1) {
-    for (Bytes& part : parts) {
-      PatchNumParts(first.publisher, static_cast<int32_t>(parts.size()), &part);
-    }
+    for (Bytes& part : parts) PatchNumParts(first.publisher, static_cast<int32_t>(parts.size()), &part);
   }
   return parts;
 }
 
 template <class Value>
+std::optional<int64_t> SourceTime(const Value& value) {
+  if constexpr (requires { Layout<MessageOf<Value>>::SourceTime(value); }) {
+    return Layout<MessageOf<Value>>::SourceTime(value);
+  } else {
+    return std::nullopt;
+  }
+}
+
+template <class Value>
 struct ValueJoiner<Value>::State {
   Value value;
-  typename Codec<Value>::Message message{};
+  MessageOf<Value> message{};
+  PartReader reader;
   int32_t next_part = 0;  // 0: a value may begin
   int32_t num_parts = 0;  // of the value that has begun
 };
@@ -98,33 +115,31 @@ bool ValueJoiner<Value>::Interrupt() {
 
 template <class Value>
 Result<const Value*> ValueJoiner<Value>::Add(ByteView message, const MessageHeader& header) {
+  using Message = MessageOf<Value>;
   State& state = *state_;
   const int32_t expected_part = std::exchange(state.next_part, 0);
   const bool continues = header.part == expected_part && (header.part == 0 || header.num_parts == state.num_parts);
   if (!continues && header.part > 0) return nullptr;
-  static const WireType& type = WireType::Named(Codec<Value>::kTypeName);
+  static const WireType& type = WireType::Named(TypeName<Value>());
   if (WireType::Of(message) != &type || !DecodeMessage(message, &state.message)) {
     return Failed("it is not a " + type.name());
   }
-  if (const std::string problem = Codec<Value>::Join(state.message, &state.value); !problem.empty()) {
-    return Failed(problem);
-  }
-  if (header.part + 1 == header.num_parts) return &state.value;
+  const bool is_last = header.part + 1 == header.num_parts;
+  if (header.part == 0) state.value = {};
+  state.reader.BeginPart(header.part == 0);
+  Layout<Message>::Describe(state.reader, std::as_const(state.message), state.value);
+  TESSERA_RETURN_IF_FAILED(state.reader.EndPart(is_last));
+  if (is_last) return &state.value;
   state.next_part = header.part + 1;
   state.num_parts = header.num_parts;
   return nullptr;
 }
 
-template <class Value>
-std::optional<int64_t> SourceTime(const Value& value) {
-  if constexpr (requires { Codec<Value>::SourceTime(value); }) {
-    return Codec<Value>::SourceTime(value);
-  } else {
-    return std::nullopt;
-  }
-}
-
-#define TESSERA_CODEC(Value)                                                                  \
+#define TESSERA_CODEC(Value, message_t)                                                       \
+  template <>                                                                                 \
+  struct Carrier<Value> {                                                                     \
+    using Message = message_t;                                                                \
+  };                                                                                          \
   template const char* TypeName<Value>();                                                     \
   template std::optional<int64_t> SourceTime<Value>(const Value&);                            \
   template std::vector<Bytes> EncodeValue<Value>(const Value&, const MessageHeader&, size_t); \

@@ -84,7 +84,7 @@ TEST(Codec, PartsOfDifferentValuesAreNotMixed) {
   ASSERT_GE(mixed.size(), 3U);
   mixed[1] = Encode(second, 10000)[1];
   CameraFrame decoded;
-  EXPECT_EQ(Decode(mixed, &decoded), "its parts belong to different frames");
+  EXPECT_EQ(Decode(mixed, &decoded), "its parts do not fit together");
 
   std::vector<Bytes> without_one = Encode(first, 10000);
   without_one.erase(without_one.begin() + 1);
@@ -277,6 +277,29 @@ TEST(Codec, KeyframesOfTheMapAreWhole) {
   MapDelta decoded;
   std::swap(messages[1], messages[2]);
   EXPECT_NE(Decode(messages, &decoded), "");
+}
+
+// Lists are dealt out as their items fit: no part but the last has room for another item of the largest kind.
+TEST(Codec, PartsAreFull) {
+  std::mt19937 generator(8);
+  const auto adjustment = DrawValue<GlobalAdjustment>(generator, 1);
+  const std::vector<Bytes> messages = Encode(adjustment, 1380);
+  ASSERT_GE(messages.size(), 3U);
+  constexpr size_t kBytesOfPose = 8 + 7 * 8;  // keyframe_pose_t
+  for (size_t i = 0; i + 1 < messages.size(); ++i) EXPECT_GT(messages[i].size() + kBytesOfPose, 1380U) << i;
+}
+
+// Figures that find no room are left out: tools read a status without joining parts.
+TEST(Codec, AStatusIsOneMessage) {
+  StageStatus status{.name = "mapper", .epoch_us = 1};
+  for (int i = 0; i < 200; ++i) status.values.emplace_back("figure_" + std::to_string(i), i);
+  const std::vector<Bytes> messages = Encode(status, 1380);
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_LE(messages[0].size(), 1380U);
+  StageStatus decoded;
+  ASSERT_EQ(Decode(messages, &decoded), "");
+  EXPECT_GT(decoded.values.size(), 20U);
+  EXPECT_LT(decoded.values.size(), 200U);
 }
 
 TEST(Codec, HeadersOutOfRangeAreRefused) {
