@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
-#include <map>
+#include <vector>
 
 #include "support/synthetic_world.h"
 
@@ -90,7 +89,7 @@ TEST(KeepBestPerSecond, GivesEachSecondToTheNearestThenToTheFirst) {
 
 TEST(RotationHistogramInliers, AreInTheThreeFullestNeighboringBins) {
   // Bins are 8 wide; the peak lies on a border.
-  EXPECT_THAT(RotationHistogramInliers(std::vector<uint8_t>{40, 39, 41, 33, 50, 100, 200}),
+  EXPECT_THAT(RotationHistogramInliers(std::vector<uint8_t>{40, 39, 41, 33, 60, 100, 200}),
               ElementsAre(1, 1, 1, 1, 0, 0, 0));
 }
 

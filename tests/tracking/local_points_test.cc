@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "support/matchers.h"
 #include "support/synthetic_world.h"

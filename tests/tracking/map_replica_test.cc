@@ -55,7 +55,7 @@ void ExpectNear(const Sim3& a, const Sim3& b) {
   EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);
 }
 
-TEST(MapReplica, WhatIsOnItsWayHasTheUnitsOfItsReference) {
+TEST(MapReplica, AnUnansweredKeyframeHasTheUnitsOfItsReference) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
@@ -71,15 +71,15 @@ TEST(MapReplica, WhatIsOnItsWayHasTheUnitsOfItsReference) {
   EXPECT_FALSE(replica.Find({{}, {2}, 1}).has_value());
 }
 
-TEST(MapReplica, BendingTakesAlongWhatIsOnItsWay) {
+TEST(MapReplica, ACorrectionMovesUnansweredKeyframesToo) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
-  const Sim3 before = replica.WorldFromKeyframe({2}).value();
+  const Sim3 world_from_sent = replica.WorldFromKeyframe({2}).value();
   const Landmark before = replica.Find({{}, {2}, 0}).value();
   ASSERT_THAT(replica.Apply(owner.Correct()), IsSuccess());
-  ExpectNear(replica.WorldFromKeyframe({2}).value(), kCorrection * before);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), kCorrection * world_from_sent);
   const Landmark after = replica.Find({{}, {2}, 0}).value();
   EXPECT_LT((after.position_in_world - kCorrection * before.position_in_world).norm(), 1e-9);
   EXPECT_LT((after.normal - kCorrection.rotation * before.normal).norm(), 1e-12);
@@ -88,7 +88,7 @@ TEST(MapReplica, BendingTakesAlongWhatIsOnItsWay) {
 }
 
 // The reference is culled in one delta, and the map is corrected in the next.
-TEST(MapReplica, AReferenceThatIsCulledLeavesItsPlace) {
+TEST(MapReplica, ACulledReferenceLeavesItsPose) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
@@ -102,7 +102,7 @@ TEST(MapReplica, AReferenceThatIsCulledLeavesItsPlace) {
   ExpectNear(replica.WorldFromKeyframe({2}).value(), kCorrection * before);
 }
 
-// The mapper puts the keyframe where the replica took it to be.
+// The mapper gives the keyframe the pose that the replica took for it.
 TEST(MapReplica, TheAnswerTakesOver) {
   Owner owner;
   MapReplica replica;
