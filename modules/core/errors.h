@@ -1,5 +1,5 @@
-// Failures that are the user's to mend: bad arguments or bad input. Every `what()` is one sentence that says
-// what is wrong, where, and what to do. Only main() turns it into exit status 2.
+// User errors: bad arguments or bad input. Every `what()` is one sentence that says what is wrong, where, and what to
+// do. Only main() turns it into exit status 2.
 #pragma once
 
 #include <stdexcept>

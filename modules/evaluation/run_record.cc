@@ -26,7 +26,7 @@ Result<> RunRecord::ApplyDelta(const MapDelta& delta) {
 }
 
 void RunRecord::AddRemoved(const RemovedInDelta& removed) {
-  for (const KeyframeTie& tie : removed.ties) removed_.Add(tie);
+  for (const KeyframeLink& link : removed.links) removed_.Add(link);
 }
 
 void RunRecord::AddGroundTruth(const GroundTruthPose& truth) {

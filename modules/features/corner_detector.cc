@@ -26,7 +26,7 @@ struct Ring {
   ptrdiff_t offsets[16];
 };
 
-// The largest of the 16 minima over 9 neighbours each, for the values d[0..15] around the ring.
+// The largest of the 16 minima over 9 neighbors each, for the values d[0..15] around the ring.
 // Arcs k .. k + 8 and k + 1 .. k + 9 share the eight values k + 1 .. k + 8.
 inline U8x32 BestArc(const U8x32* d) {
   U8x32 pairs[8];
@@ -41,7 +41,7 @@ inline U8x32 BestArc(const U8x32* d) {
   return best;
 }
 
-// Upper bound of BestArc by the four pixels right, left, above and below: nine neighbours hold two of them in sequence.
+// Upper bound of BestArc by the four pixels right, left, above and below: nine neighbors hold two of them in sequence.
 inline U8x32 ArcBound(U8x32 below, U8x32 right, U8x32 above, U8x32 left) {
   return Min(Max(below, above), Max(right, left));
 }
@@ -49,13 +49,13 @@ inline U8x32 ArcBound(U8x32 below, U8x32 right, U8x32 above, U8x32 left) {
 // Scores of the 32 pixels from `p` on; 0 where lower than min_score (which may be left out as well where no pixel of
 // the 32 reaches it).
 inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
-  const U8x32 centre = simd::Load8(p);
+  const U8x32 center = simd::Load8(p);
   U8x32 brighter[16];
   U8x32 darker[16];
   const auto compare = [&](int i) {
     const U8x32 value = simd::Load8(p + ring.offsets[i]);
-    brighter[i] = SubtractSaturated(value, centre);
-    darker[i] = SubtractSaturated(centre, value);
+    brighter[i] = SubtractSaturated(value, center);
+    darker[i] = SubtractSaturated(center, value);
   };
   for (const int i : {0, 4, 8, 12}) compare(i);
   const U8x32 bound = Max(ArcBound(brighter[0], brighter[4], brighter[8], brighter[12]),
@@ -66,8 +66,8 @@ inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
   return SubtractSaturated(Max(BestArc(brighter), BestArc(darker)), one);
 }
 
-// Where between the places -1 and 1 a parabola through three scores has its maximum, in 1/kCornerSubpixels, rounded to
-// nearest: (after - before) / (2 (2 best - before - after)); before and after <= best.
+// Where between the positions -1 and 1 a parabola through three scores has its maximum, in 1/kCornerSubpixels, rounded
+// to nearest: (after - before) / (2 (2 best - before - after)); before and after <= best.
 inline int8_t ParabolaMaximum(int before, int best, int after) {
   const int curvature = 2 * best - before - after;
   if (curvature == 0) return 0;
@@ -100,9 +100,9 @@ CornerDetector::Corner CornerDetector::CornerAt(const Rect& corners, int x, int 
 void CornerDetector::Insert(size_t cell, Corner corner) {
   Corner* const begin = &best_[cell * static_cast<size_t>(capacity_)];
   int& count = num_best_[cell];
-  Corner* place = begin + std::min(count, capacity_ - 1);
-  for (; place > begin && place[-1].score < corner.score; --place) *place = place[-1];
-  *place = corner;
+  Corner* slot = begin + std::min(count, capacity_ - 1);
+  for (; slot > begin && slot[-1].score < corner.score; --slot) *slot = slot[-1];
+  *slot = corner;
   count = std::min(count + 1, capacity_);
   if (count == capacity_) lowest_[cell] = begin[capacity_ - 1].score;
 }

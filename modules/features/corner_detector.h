@@ -15,13 +15,13 @@ class CornerDetector {
   // Appends the corners of the plan's cells, cell by cell, best first, `capacity` per cell at most. The image,
   // smoothed lightly so that noise makes no corners, must hold 4 px around plan.corners.
   //
-  // score(p): the largest threshold t for which p is a corner, i.e. nine neighbouring pixels of the ring of 16 are all
+  // score(p): the largest threshold t for which p is a corner, i.e. nine neighboring pixels of the ring of 16 are all
   // brighter than p + t, or all darker than p - t.
   //
-  // Between the pixels the corner stands where the parabola through the scores of three neighbours of a row or column
+  // Between the pixels the corner stands where the parabola through the scores of three neighbors of a row or column
   // has its maximum; scores below min_score count as min_score - 1.
   //
-  // A corner counts if its score is at least min_score and the highest among its eight neighbours; of equal neighbours
+  // A corner counts if its score is at least min_score and the highest among its eight neighbors; of equal neighbors
   // the first in reading order counts. Within a cell, a higher score is better, then the first in reading order.
   void Detect(const LevelImage& image, const LevelPlan& plan, int level, int min_score, int capacity,
               std::vector<Candidate>& out);
@@ -43,7 +43,7 @@ class CornerDetector {
 
   int capacity_ = 0;
   std::vector<uint8_t> score_rows_[3];  // scores of three rows; corners.x stands at kRowRoom
-  std::vector<Corner> best_;            // capacity_ places for each cell of one row of cells, best first
+  std::vector<Corner> best_;            // capacity_ slots for each cell of one row of cells, best first
   std::vector<int> num_best_;           // how many of them are taken
   std::vector<uint8_t> lowest_;         // a corner must score more than this to enter the cell's list
 };

@@ -44,7 +44,7 @@ constexpr std::array<uint16_t, 16> MakeColumns(int first) {
 constexpr std::array<uint16_t, 16> kEvenColumns = MakeColumns(0);
 constexpr std::array<uint16_t, 16> kOddColumns = MakeColumns(1);
 
-// round(2^22 tan((k + 1/2) / 256 turn)), k = 0 .. 31: the bounds between neighbouring angles of the first octant.
+// round(2^22 tan((k + 1/2) / 256 turn)), k = 0 .. 31: the bounds between neighboring angles of the first octant.
 constexpr int kTangentBits = 22;  // AngleOf's numbers have 40 bits at most, so products fit 63
 constexpr std::array<int64_t, 32> kTangents = {51474,   154485,  257683,  361192,  465140,  569655,  674869,  780918,
                                                887941,  996082,  1105491, 1216326, 1328749, 1442935, 1559067, 1677337,
@@ -69,17 +69,17 @@ uint8_t AngleOf(int64_t x, int64_t y) {
 uint8_t Orientation(const LevelImage& image, int x, int y) {
   // Column sums over all rows give the x moment; differences of the rows y and -y, times y, the y moment. Even and odd
   // columns are kept apart in 16-bit lanes; the largest value is 255 * (1 + .. + 15) = 30600.
-  const uint8_t* centre = image.At(x - kRadius, y);
+  const uint8_t* center = image.At(x - kRadius, y);
   const ptrdiff_t stride = image.stride();
-  const U8x32 middle = simd::And(Load8(centre), Load8(kDisc[0].data()));
+  const U8x32 middle = simd::And(Load8(center), Load8(kDisc[0].data()));
   U16x16 even_sums = simd::EvenBytes(middle);
   U16x16 odd_sums = simd::OddBytes(middle);
   U16x16 y_moments = simd::Fill16(0);
   U16x16 odd_y_moments = y_moments;
   for (int dy = 1; dy <= kRadius; ++dy) {
     const U8x32 disc = Load8(kDisc[static_cast<size_t>(dy)].data());
-    const U8x32 below = simd::And(Load8(centre + dy * stride), disc);
-    const U8x32 above = simd::And(Load8(centre - dy * stride), disc);
+    const U8x32 below = simd::And(Load8(center + dy * stride), disc);
+    const U8x32 above = simd::And(Load8(center - dy * stride), disc);
     const U16x16 even_below = simd::EvenBytes(below);
     const U16x16 even_above = simd::EvenBytes(above);
     const U16x16 odd_below = simd::OddBytes(below);

@@ -78,7 +78,7 @@ struct TileJob {
   FeatureOptions options;
   int32_t first_level = 0;  // levels first_level .. last_level are to be extracted
   int32_t last_level = 0;
-  Rect core;         // level-0 rectangle that the tile owns: it answers for the cells whose centre lies in it
+  Rect core;         // level-0 rectangle that the tile owns: it answers for the cells whose center lies in it
   Rect left_rect;    // level-0 pixels in `left`: the core and the margins it needs
   GrayImage left;    // left_rect of the left image
   Rect right_rect;   // stereo: level-0 pixels in `right`

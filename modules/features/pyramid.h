@@ -32,7 +32,7 @@ int LevelSize(int size, int level);
 // 1.2^level
 double LevelScale(int level);
 
-// Level-0 position of position `x` (of a pixel's centre, in pixels) of a level.
+// Level-0 position of position `x` (of a pixel's center, in pixels) of a level.
 float LevelZeroPosition(double x, int level);
 
 // floor of the level-0 coordinate of the edge `half_edges` / 2 of a level, where edge x is the left side of pixel x.

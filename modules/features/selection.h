@@ -10,7 +10,7 @@
 namespace tessera {
 
 // Indices of the candidates that become keypoints, options.num_features at most, in the order (level, y, x); of
-// candidates at the same place, the first is taken. A pure function of the set of candidates.
+// candidates at the same position, the first is taken. A pure function of the set of candidates.
 //
 // Each level has a quota (LevelQuotas); what a level can't fill goes to the others, finest first. Within a level the
 // candidates with the highest priority are taken (ties by y, then x):

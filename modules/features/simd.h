@@ -69,7 +69,7 @@ inline int32_t SignedDot(U16x16 a, U16x16 b) {
   sum = _mm_add_epi32(sum, _mm_shuffle_epi32(sum, 0xB1));
   return _mm_cvtsi128_si32(sum);
 }
-// Eight weighted pairs from each of two places:
+// Eight weighted pairs from each of two positions:
 //   out_low[i] = low[pairs[2i]] * weights[2i] + low[pairs[2i+1]] * weights[2i+1], out_high likewise, i = 0..7;
 // pairs < 16, weights < 128.
 inline void WeightedPairs(const uint8_t* low, const uint8_t* high, const uint8_t* pairs, const uint8_t* weights,

@@ -19,12 +19,13 @@ static_assert(kMaxDifference * kWindow <= 255);
 
 // A match must cost at most this on average per pixel, ...
 constexpr int kMaxMeanCost = 9;
-// ... and at most 4/5 of any other place that isn't next to it.
+// ... and at most 4/5 of any other position that isn't next to it.
 constexpr int kUniqueNumerator = 4;
 constexpr int kUniqueDenominator = 5;
-constexpr int kNeighbourhood = 2;
+constexpr int kNeighborhood = 2;
 
-// Where between the places -1 and 1 a parabola through three costs has its minimum, in 1/64; before and after >= best.
+// Where between the positions -1 and 1 a parabola through three costs has its minimum, in 1/64; before and after >=
+// best.
 int ParabolaMinimum(int before, int best, int after) {
   const int curvature = before - 2 * best + after;
   if (curvature == 0) return 0;
@@ -64,7 +65,7 @@ void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right
 
 std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage& right, int x, int y,
                                         int max_disparity) {
-  // One place more at both ends lets the first and the last one have neighbours.
+  // One more position at both ends, so that the first and the last one have neighbors.
   const int first = std::max(x - max_disparity - 1, kRadius);
   const int count = x + 2 - first;
   ComputeCosts(left, right, x, y, first, count);
@@ -75,11 +76,11 @@ std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage
   const auto second = [&](auto from, auto to) {
     return from < to ? *std::min_element(from, to) : uint16_t{UINT16_MAX};
   };
-  const int other = std::min(second(begin, best - std::min<ptrdiff_t>(best - begin, kNeighbourhood)),
-                             second(best + std::min<ptrdiff_t>(end - best, kNeighbourhood + 1), end));
+  const int other = std::min(second(begin, best - std::min<ptrdiff_t>(best - begin, kNeighborhood)),
+                             second(best + std::min<ptrdiff_t>(end - best, kNeighborhood + 1), end));
   if (*best * kUniqueDenominator > other * kUniqueNumerator) return std::nullopt;
-  const int place = first + static_cast<int>(best - begin);
-  return std::min(place * kSubpixels + ParabolaMinimum(best[-1], *best, best[1]), x * kSubpixels);
+  const int position = first + static_cast<int>(best - begin);
+  return std::min(position * kSubpixels + ParabolaMinimum(best[-1], *best, best[1]), x * kSubpixels);
 }
 
 }  // namespace tessera

@@ -14,7 +14,7 @@ class StereoMatcher {
   static constexpr int kSubpixels = 64;  // positions are counted in 1/64 px
 
   // Position of the pixel (x, y) of the left image in the right image, in 1/64 px of the level, at most max_disparity
-  // to the left of x; nullopt if no place matches well, or more than one does. Compares windows of 11 x 11 px by
+  // to the left of x; nullopt if no position matches well, or more than one does. Compares windows of 11 x 11 px by
   //
   //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, y + j)|, 23),
   //
@@ -25,7 +25,7 @@ class StereoMatcher {
  private:
   void ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
 
-  std::array<uint16_t, 1120> costs_;  // of the places first, first + 1, ... of the right image
+  std::array<uint16_t, 1120> costs_;  // of the positions first, first + 1, ... of the right image
 };
 
 }  // namespace tessera

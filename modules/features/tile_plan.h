@@ -1,8 +1,8 @@
-// Which cells a tile answers for, and which pixels it needs for that: the one place that dispatcher and extractor agree
+// Which cells a tile answers for, and which pixels it needs for that: what dispatcher and extractor agree
 // on.
 //
 // Each level of the pyramid carries a fixed grid of cells over the pixels that are far enough from the image's border
-// to be described. A cell belongs to the tile whose core holds its centre (in level-0 coordinates). Rectangles are
+// to be described. A cell belongs to the tile whose core holds its center (in level-0 coordinates). Rectangles are
 // products of an interval along x and one along y, so both axes are planned alike.
 #pragma once
 
@@ -17,7 +17,7 @@ namespace tessera {
 // Side of a cell, pixels of its level.
 inline constexpr int kCellPx = 32;
 // A keypoint and its cell see this far: 15 px of the rotated pattern (or of the orientation's disc) and 3 px of blur.
-// The ring of the corner test (3 px) and its neighbours (1 px) lie within.
+// The ring of the corner test (3 px) and its neighbors (1 px) lie within.
 inline constexpr int kPatchRadiusPx = 15;
 inline constexpr int kBlurRadiusPx = 3;
 inline constexpr int kBorderPx = kPatchRadiusPx + kBlurRadiusPx;
@@ -34,7 +34,7 @@ struct CellAxis {
   }
   // Pixels of cells first .. last - 1; the last cell of the grid may be narrower.
   Interval Pixels(Interval cells) const;
-  // Cells whose centre lies in `core`, level-0 pixels.
+  // Cells whose center lies in `core`, level-0 pixels.
   Interval CellsOf(Interval core, int level) const;
 
   int level_size;

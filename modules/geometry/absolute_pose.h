@@ -1,4 +1,4 @@
-// The pose of a camera from points whose place in the world is known, without a guess to start from.
+// The pose of a camera from points whose position in the world is known, without an initial guess.
 #pragma once
 
 #include <Eigen/Core>

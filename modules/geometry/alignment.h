@@ -14,9 +14,9 @@ struct Alignment {
   double rms = 0.0;  // of |b_from_a * a_i - b_i|, in units of b
 };
 
-// Minimises sum |b_from_a * a_i - b_i|^2 over rotation, translation and, if `with_scale`, scale (else it is 1), in
+// Minimizes sum |b_from_a * a_i - b_i|^2 over rotation, translation and, if `with_scale`, scale (else it is 1), in
 // closed form: S. Umeyama, "Least-Squares Estimation of Transformation Parameters Between Two Point Patterns", PAMI
-// 1991. The spans must have the same length. nullopt with fewer than three points, or if they all lie at one place of
+// 1991. The spans must have the same length. nullopt with fewer than three points, or if they all coincide in
 // `a`; points on one line leave the rotation about it open, and some best one is returned.
 std::optional<Alignment> AlignPoints(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b,
                                      bool with_scale);

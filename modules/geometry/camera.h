@@ -1,7 +1,7 @@
 // The camera as every stage behind the camera stage sees it: images are already undistorted and rectified, so it
 // is a pinhole, and the right camera of a stereo pair looks along the same rows.
 //
-// Camera frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top left pixel.
+// Camera frame: x right, y down, z forward. Pixel (0, 0) is the center of the top left pixel.
 //
 //   u = fx x/z + cx,   v = fy y/z + cy                          [px]
 //   u_right = u - fx * baseline / z                             [px]
@@ -28,7 +28,7 @@ struct CameraCalibration {
   double cx_px = 0.0;
   double cy_px = 0.0;
   double baseline_m = 0.0;    // stereo: distance from left to right camera; otherwise 0
-  double depth_unit_m = 0.0;  // RGB-D: metres per count of the depth image; otherwise 0
+  double depth_unit_m = 0.0;  // RGB-D: meters per count of the depth image; otherwise 0
 
   bool operator==(const CameraCalibration&) const = default;
 

@@ -26,7 +26,7 @@ struct CameraFrame {
 struct GroundTruthPose {
   FrameId frame;
   int64_t utime_us = 0;
-  Rigid3 world_from_camera;  // metres; any world frame
+  Rigid3 world_from_camera;  // meters; any world frame
 };
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Two views of the same points: the matrices that tie them, and the camera motions that such a matrix allows.
+// Two views of the same points: the matrices that relate them, and the camera motions that such a matrix allows.
 // Points are rays with z = 1. The direction of a translation is all that two views tell: it has length 1.
 #pragma once
 
@@ -48,7 +48,7 @@ struct RefinedMotion {
 };
 
 // Refines R and the direction of t of second_from_first by Gauss-Newton on the Huber-weighted Sampson distances, which
-// to first order is the reprojection error minimised over all points as well. `corner` is Huber's, in ray units.
+// to first order is the reprojection error minimized over all points as well. `corner` is Huber's, in ray units.
 RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
                            int max_iterations = 10);
 

@@ -20,7 +20,7 @@ struct PoseObservation {
 struct PoseOptimizationOptions {
   int num_rounds = 4;      // after each, observations are sorted anew into inliers and outliers
   int max_iterations = 5;  // Gauss-Newton steps a round; they converge in 2 to 4 from a fair start
-  double min_step = 1e-9;  // a smaller step (metres and radians, norm) ends the round
+  double min_step = 1e-9;  // a smaller step (meters and radians, norm) ends the round
 };
 
 struct PoseOptimizationResult {
@@ -31,7 +31,7 @@ struct PoseOptimizationResult {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();  // of Retract's tangent
 };
 
-// Minimises over camera_from_world, by Gauss-Newton with Huber weights,
+// Minimizes over camera_from_world, by Gauss-Newton with Huber weights,
 //
 //   sum_i rho(|r_i|^2),   r_i = (project(camera_from_world * point_i) - pixel_i) / sigma_i
 //

@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// a_from_b: x_a = rotation * x_b + translation. The rotation is a unit quaternion; translation in metres
+// a_from_b: x_a = rotation * x_b + translation. The rotation is a unit quaternion; translation in meters
 // (mono: in units of the map).
 struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
@@ -73,7 +73,7 @@ Eigen::Vector3d LogSO3(const Eigen::Quaterniond& rotation);
 
 // Tangent vectors of SE(3) are (translation [m], rotation [rad]) stacked, applied from the left:
 //   Retract(a_from_b, delta) = Rigid3{ExpSO3(delta.tail<3>()), delta.head<3>()} * a_from_b
-// (first-order equal to the exponential map, cheaper, and as good for optimisation).
+// (first-order equal to the exponential map, cheaper, and as good for optimization).
 Rigid3 Retract(const Rigid3& a_from_b, const Eigen::Matrix<double, 6, 1>& delta);
 
 // Of Sim(3): (translation, rotation [rad], logarithm of scale) stacked, applied from the left:

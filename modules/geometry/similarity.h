@@ -1,4 +1,4 @@
-// The similarity between two places of a map, or two maps, that hold the same landmarks twice.
+// The similarity between two regions of a map, or two maps, that hold the same landmarks twice.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,13 +32,14 @@ struct SimilarityOptions {
   // Standard deviations of pixels are taken this many times as large, since the landmarks are not known exactly either:
   // the limit of 95 % becomes that of 99 %.
   double sigma_factor = 1.24;
-  // Standard deviation of a landmark's depth as a part of it, where no right column tells it better. It is what keeps
-  // far points of mono maps, and also tells the scale from the ratios of depths: seen from one and the same place,
-  // two maps of any scale give the same pixels.
+  // Standard deviation of a landmark's depth as a fraction of it, where no right column measures it better. It is what
+  // keeps far points of mono maps, and also tells the scale from the ratios of depths: seen from the same position, two
+  // maps of any scale give the same pixels.
   double depth_sigma = 0.1;
   int num_rounds = 4;      // of refinement; after each, pairs are sorted anew into inliers and outliers
   int max_iterations = 6;  // Levenberg-Marquardt steps a round; they converge in 2 to 4 from a fair start
-  // Points on a line, or all at one place, leave a turn open: no estimate where the rotation is known worse than this.
+  // Points on a line, or all in one direction, leave a rotation open: no estimate where the rotation is known worse
+  // than this.
   double max_rotation_sigma_rad = 0.03;
 
   Result<> Check() const;
@@ -51,7 +52,7 @@ struct SimilarityEstimate {
   double rotation_sigma_rad = 0.0;  // of the worst axis; infinite if open
 };
 
-// Without a guess to start from: RANSAC over triples (AlignPoints). A pair is an inlier if each keyframe sees the
+// Without an initial guess: RANSAC over triples (AlignPoints). A pair is an inlier if each keyframe sees the
 // other's point within the chi-square limit (e' W e, see below) and the two depths agree to 3 sigmas (of d). Each new
 // best is refined on its inliers (O. Chum, J. Matas, J. Kittler, "Locally Optimized RANSAC", DAGM 2003), since the
 // depths of three points are noisy. `seed` decides the samples. nullopt: fewer than min_inliers agree, or they leave
@@ -60,7 +61,7 @@ std::optional<SimilarityEstimate> EstimateSimilarity(const CameraCalibration& ca
                                                      std::span<const PointPair> pairs, uint64_t seed,
                                                      const SimilarityOptions& options);
 
-// Minimises over S = first_from_second, by Levenberg-Marquardt over 7 or 6 degrees of freedom,
+// Minimizes over S = first_from_second, by Levenberg-Marquardt over 7 or 6 degrees of freedom,
 //
 //   1/2 sum_i rho(e1' W1 e1) + rho(e2' W2 e2) + rho(d^2)
 //

@@ -70,7 +70,7 @@ bool SimilarityProblem::Fits(const Sim3& viewer_from_owner, double factor, size_
   const Eigen::Vector3d point = viewer_from_owner * sights.points[i];
   if (!(sights.points[i].z() >= kMinDepth) || !(point.z() >= kMinDepth)) return false;
   const Reprojection seen = Reproject(calibration_, options_.baseline_m, point, sights.seen[i]);
-  // d(point)/d(ln depth) = point - (centre of the owner's camera)
+  // d(point)/d(ln depth) = point - (center of the owner's camera)
   sights.spreads[i] = sights.depth_sigmas[i] * (seen.by_point * (point - viewer_from_owner.translation));
   return WhitenedSquare(seen.residual, sights.spreads[i]) <= factor * Chi2Limit(sights.seen[i].has_right());
 }

@@ -33,7 +33,7 @@ class SimilarityProblem {
   struct Sights {
     std::vector<Eigen::Vector3d> points;   // landmarks in the frame of the keyframe that knows them
     std::vector<PixelObservation> seen;    // by the other
-    std::vector<double> depth_sigmas;      // of `points`, as a part of the depth
+    std::vector<double> depth_sigmas;      // of `points`, as a fraction of the depth
     std::vector<Eigen::Vector3d> spreads;  // d(residual)/d(ln depth) * depth_sigma, as of the last Classify
   };
   struct Linear;

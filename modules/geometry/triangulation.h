@@ -34,14 +34,14 @@ struct PointRefinement {
   int worst_view = -1;                                   // that view
 };
 
-// Minimises the Huber-weighted reprojection error over the point alone, poses fixed, by Gauss-Newton with
+// Minimizes the Huber-weighted reprojection error over the point alone, poses fixed, by Gauss-Newton with
 // Levenberg's damping:  sum_i rho(|project(camera_i_from_world * point) - pixel_i|^2 / sigma_i^2).
 // All views share one calibration. nullopt if the point leaves the front of a camera or the views don't fix it.
 std::optional<PointRefinement> RefinePoint(const CameraCalibration& calibration, double baseline_m,
                                            std::span<const PointView> views, const Eigen::Vector3d& point_in_world,
                                            int max_iterations = 8);
 
-// Cosine of the angle at `point` between the lines to the two camera centres.
+// Cosine of the angle at `point` between the lines to the two camera centers.
 double CosParallax(const Eigen::Vector3d& point, const Eigen::Vector3d& center_a, const Eigen::Vector3d& center_b);
 
 }  // namespace tessera

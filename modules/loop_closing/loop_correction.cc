@@ -40,7 +40,7 @@ std::vector<LoopResult::Correction> JoinParts(const Map& map, KeyframeId current
   const Sim3 new_from_old =
       moves_current ? matched_world_from_current_world : matched_world_from_current_world.Inverse();
   std::vector<LoopResult::Correction> corrections;
-  for (const KeyframeId id : PartOf(map, moves_current ? current : place.matched)) {
+  for (const KeyframeId id : MapPartOf(map, moves_current ? current : place.matched)) {
     corrections.push_back({id, new_from_old});
   }
   return corrections;
@@ -59,7 +59,7 @@ PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const V
   problem.has_scale = map.FindKeyframe(current)->features->calibration.sensor == SensorType::kMono;
   const KeyframeId root = RootOf(map, current);
   std::map<KeyframeId, int> node_of;
-  for (const KeyframeId id : PartOf(map, current)) {
+  for (const KeyframeId id : MapPartOf(map, current)) {
     node_of[id] = static_cast<int>(problem.nodes.size());
     problem.nodes.push_back({id, PoseOf(map, id), id == root});
   }

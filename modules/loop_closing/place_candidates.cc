@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 
 namespace tessera {
 namespace {

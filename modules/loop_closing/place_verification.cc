@@ -4,7 +4,7 @@
 #include <memory>
 #include <set>
 
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 #include "matching/frame_pose.h"
 
 namespace tessera {
@@ -71,22 +71,22 @@ Result<> VerificationOptions::Check() const {
   return guided.Check();
 }
 
-PlacedPoints LandmarksAround(const Map& map, KeyframeId center, int num_neighbors) {
-  PlacedPoints points;
+KnownPoints LandmarksAround(const Map& map, KeyframeId center, int num_neighbors) {
+  KnownPoints points;
   for (const LandmarkId id : LandmarksSeenBy(map, KeyframesAround(map, center, num_neighbors))) {
     points.emplace_back(PointId{id, {}, -1}, *map.FindLandmark(id));
   }
   return points;
 }
 
-int LocalizeAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
+int LocalizeAmong(const KnownPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
                   TrackedFrame& frame) {
   frame.points.assign(frame.points.size(), {});
   MatchLocal(points, matching.local_radius_px, matching, frame);
   return OptimizeFrame(pose, frame);
 }
 
-double Coverage(const PlacedPoints& points, const TrackedFrame& frame) {
+double Coverage(const KnownPoints& points, const TrackedFrame& frame) {
   constexpr int kCellsAcross = 16, kMinExpected = 3;
   const CameraCalibration& camera = frame.view->calibration();
   const double cell_px = static_cast<double>(camera.width_px) / kCellsAcross;
@@ -132,7 +132,7 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
   if (!aligned) return std::nullopt;
 
   TrackedFrame frame(std::make_shared<const FrameView>(*current.features));
-  const PlacedPoints landmarks = LandmarksAround(map, candidate, options.num_neighbors);
+  const KnownPoints landmarks = LandmarksAround(map, candidate, options.num_neighbors);
   frame.world_from_camera = (Sim3::From(matched.world_from_camera) * aligned->first_from_second).Pose();
   if (LocalizeAmong(landmarks, options.guided, {}, frame) < options.min_seen) return std::nullopt;
   if (Coverage(landmarks, frame) < options.min_coverage) return std::nullopt;

@@ -51,16 +51,16 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
                                          VerificationSteps* steps);
 
 // The landmarks that the keyframe and its neighbors observe, by id.
-PlacedPoints LandmarksAround(const Map& map, KeyframeId id, int num_neighbors);
+KnownPoints LandmarksAround(const Map& map, KeyframeId id, int num_neighbors);
 
 // Guided matching of the points from the pose of `frame`, then pose optimization with the matches found; outliers are
 // removed. Returns the number of matches left.
-int LocalizeAmong(const PlacedPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
+int LocalizeAmong(const KnownPoints& points, const MatchOptions& matching, const PoseOptimizationOptions& pose,
                   TrackedFrame& frame);
 
 // The share of image cells with a match (1/16 of the width each), of those cells in which the frame, at its pose,
 // should see several of the points. An object found in two places, such as a parked car of the same make, agrees with a
 // pose as well as a place does; but what is around the object is not seen then.
-double Coverage(const PlacedPoints& points, const TrackedFrame& frame);
+double Coverage(const KnownPoints& points, const TrackedFrame& frame);
 
 }  // namespace tessera

@@ -54,7 +54,7 @@ RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, con
     if (!pose) continue;
     TrackedFrame frame(view);
     frame.world_from_camera = *pose;
-    const PlacedPoints landmarks = LandmarksAround(map, id, options.num_neighbors);
+    const KnownPoints landmarks = LandmarksAround(map, id, options.num_neighbors);
     if (LocalizeAmong(landmarks, options.guided, {}, frame) < options.min_seen) continue;
     if (Coverage(landmarks, frame) < options.min_coverage) continue;
     answer.reference = id;

@@ -7,7 +7,7 @@ namespace tessera {
 
 // The landmark with normal, distance range and descriptor computed anew from its present observations (at least one):
 //
-//   normal = normalised mean over observations of (camera_in_world - position) / |camera_in_world - position|
+//   normal = normalized mean over observations of (camera_in_world - position) / |camera_in_world - position|
 //   max_distance = d * 1.2^level,  min_distance = max_distance / 1.2^(num_levels - 1)
 //
 // with d and level from the newest keyframe that saw it: closer than min_distance or farther than max_distance its

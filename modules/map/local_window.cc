@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 
 namespace tessera {
 namespace {

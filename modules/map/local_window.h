@@ -1,4 +1,4 @@
-// Which part of the map a local bundle adjustment works on.
+// The keyframes and landmarks that a local bundle adjustment works on.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,9 @@ namespace tessera {
 
 struct LocalWindowOptions {
   int max_inner_keyframes = 12;   // poses that move
-  int min_shared_landmarks = 15;  // a keyframe that shares fewer with the centre is no neighbour (as in ORB-SLAM)
-  int max_outer_keyframes = 20;   // poses that hold the window in place; those that see most of its landmarks
-  // Outer poses move too, tied to their neighbours by the relative poses that they have, and see no points (the double
+  int min_shared_landmarks = 15;  // a keyframe that shares fewer with the center is no neighbor (as in ORB-SLAM)
+  int max_outer_keyframes = 20;   // poses that constrain the window: those that see most of its landmarks
+  // Outer poses move too, constrained by their poses relative to their neighbors, and see no points (the double
   // window of Strasdat et al. 2011); else they stay, and see the window's points. stages/mapper/README.md has figures.
   bool is_double = false;
 
@@ -20,7 +20,7 @@ struct LocalWindowOptions {
 };
 
 struct LocalWindow {
-  std::vector<KeyframeId> inner;      // the centre and its neighbours, by id
+  std::vector<KeyframeId> inner;      // the center and its neighbors, by id
   std::vector<KeyframeId> outer;      // others that see the same landmarks, by id
   std::vector<LandmarkId> landmarks;  // seen by an inner keyframe and by two keyframes of the window at least, by id
 };

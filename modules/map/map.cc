@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 // The hash of a map is the sum (modulo 2^64) of the hashes of its facts, so that it follows each change at once and
-// does not depend on the order of changes. A fact's hash mixes its words by the finaliser of SplitMix64 (Steele et al.
+// does not depend on the order of changes. A fact's hash mixes its words by the finalizer of SplitMix64 (Steele et al.
 // 2014).
 class FactHash {
  public:
@@ -121,72 +121,87 @@ Result<> Map::Apply(const MapDelta& delta) {
 }
 
 Result<> Map::ApplyLists(const MapDelta& delta) {
-  for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
-    if (!added.id.valid() || keyframes_.Has(added.id) || added.id.value > keyframes_.end_id() + kMaxIdLeap ||
-        added.features == nullptr || added.features->descriptors.size() != added.features->keypoints.size()) {
-      return Failed(Name(added.id) + " can't be added");
-    }
-    const size_t num_keypoints = added.features->keypoints.size();
-    const Keyframe& keyframe = keyframes_.Put(added.id, {added.features,
-                                                         HashOf(*added.features),
-                                                         added.world_from_camera,
-                                                         added.scale,
-                                                         added.parent,
-                                                         std::vector<LandmarkId>(num_keypoints),
-                                                         {}});
-    hash_ += HashOf(added.id, keyframe);
-  }
-  for (const MapDelta::MovedKeyframe& moved : delta.moved_keyframes) {
-    Keyframe* keyframe = keyframes_.Find(moved.id);
-    if (keyframe == nullptr) return Failed(Name(moved.id) + " is not there to be moved");
-    hash_ -= HashOf(moved.id, *keyframe);
-    keyframe->world_from_camera = moved.world_from_camera;
-    keyframe->scale = moved.scale;
-    hash_ += HashOf(moved.id, *keyframe);
-  }
-  for (const auto& [id, landmark] : delta.changed_landmarks) {
-    if (!id.valid() || id.value > landmarks_.end_id() + kMaxIdLeap) return Failed(Name(id) + " can't be added");
-    if (Landmark* old = landmarks_.Find(id); old != nullptr) {
-      hash_ -= HashOf(id, *old);
-      *old = landmark;
-    } else {
-      landmarks_.Put(id, landmark);
-      observations_.Put(id, {});
-    }
-    hash_ += HashOf(id, landmark);
-  }
-  for (const auto& change : delta.removed_observations) {
-    TESSERA_RETURN_IF_FAILED(RemoveObservation(change));
-  }
-  for (const auto& change : delta.new_observations) {
-    TESSERA_RETURN_IF_FAILED(AddObservation(change));
-  }
-  for (const auto& [id, parent] : delta.changed_parents) {
-    Keyframe* keyframe = keyframes_.Find(id);
-    if (keyframe == nullptr) return Failed(Name(id) + " is not there to get another parent");
-    hash_ -= HashOf(id, *keyframe);
-    keyframe->parent = parent;
-    hash_ += HashOf(id, *keyframe);
-  }
-  for (const LandmarkId id : delta.removed_landmarks) {
-    if (!landmarks_.Has(id) || !observations_.Find(id)->empty()) return Failed(Name(id) + " can't be removed");
-    hash_ -= HashOf(id, *landmarks_.Find(id));
-    landmarks_.Remove(id);
-    observations_.Remove(id);
-  }
-  for (const KeyframeId id : delta.removed_keyframes) {
-    const Keyframe* keyframe = keyframes_.Find(id);
-    if (keyframe == nullptr || std::any_of(keyframe->landmarks.begin(), keyframe->landmarks.end(),
-                                           [](LandmarkId landmark) { return landmark.valid(); })) {
-      return Failed(Name(id) + " can't be removed");
-    }
-    hash_ -= HashOf(id, *keyframe);
-    keyframes_.Remove(id);
-  }
+  for (const auto& added : delta.new_keyframes) TESSERA_RETURN_IF_FAILED(AddKeyframe(added));
+  for (const auto& moved : delta.moved_keyframes) TESSERA_RETURN_IF_FAILED(MoveKeyframe(moved));
+  for (const auto& changed : delta.changed_landmarks) TESSERA_RETURN_IF_FAILED(ChangeLandmark(changed));
+  for (const auto& removed : delta.removed_observations) TESSERA_RETURN_IF_FAILED(RemoveObservation(removed));
+  for (const auto& added : delta.new_observations) TESSERA_RETURN_IF_FAILED(AddObservation(added));
+  for (const auto& changed : delta.changed_parents) TESSERA_RETURN_IF_FAILED(ChangeParent(changed));
+  for (const LandmarkId id : delta.removed_landmarks) TESSERA_RETURN_IF_FAILED(RemoveLandmark(id));
+  for (const KeyframeId id : delta.removed_keyframes) TESSERA_RETURN_IF_FAILED(RemoveKeyframe(id));
   for (const ClosedLoop& loop : delta.closed_loops) {
     hash_ += HashOf(closed_loops_.size(), loop);
     closed_loops_.push_back(loop);
   }
+  return {};
+}
+
+Result<> Map::AddKeyframe(const MapDelta::NewKeyframe& added) {
+  if (!added.id.valid() || keyframes_.Has(added.id) || added.id.value > keyframes_.end_id() + kMaxIdLeap ||
+      added.features == nullptr || added.features->descriptors.size() != added.features->keypoints.size()) {
+    return Failed(Name(added.id) + " can't be added");
+  }
+  const size_t num_keypoints = added.features->keypoints.size();
+  const Keyframe& keyframe = keyframes_.Put(added.id, {added.features,
+                                                       HashOf(*added.features),
+                                                       added.world_from_camera,
+                                                       added.scale,
+                                                       added.parent,
+                                                       std::vector<LandmarkId>(num_keypoints),
+                                                       {}});
+  hash_ += HashOf(added.id, keyframe);
+  return {};
+}
+
+Result<> Map::MoveKeyframe(const MapDelta::MovedKeyframe& moved) {
+  Keyframe* keyframe = keyframes_.Find(moved.id);
+  if (keyframe == nullptr) return Failed(Name(moved.id) + " is not there to be moved");
+  hash_ -= HashOf(moved.id, *keyframe);
+  keyframe->world_from_camera = moved.world_from_camera;
+  keyframe->scale = moved.scale;
+  hash_ += HashOf(moved.id, *keyframe);
+  return {};
+}
+
+Result<> Map::ChangeLandmark(const MapDelta::ChangedLandmark& changed) {
+  const auto& [id, landmark] = changed;
+  if (!id.valid() || id.value > landmarks_.end_id() + kMaxIdLeap) return Failed(Name(id) + " can't be added");
+  if (Landmark* old = landmarks_.Find(id); old != nullptr) {
+    hash_ -= HashOf(id, *old);
+    *old = landmark;
+  } else {
+    landmarks_.Put(id, landmark);
+    observations_.Put(id, {});
+  }
+  hash_ += HashOf(id, landmark);
+  return {};
+}
+
+Result<> Map::ChangeParent(const MapDelta::ChangedParent& changed) {
+  Keyframe* keyframe = keyframes_.Find(changed.id);
+  if (keyframe == nullptr) return Failed(Name(changed.id) + " is not there to get another parent");
+  hash_ -= HashOf(changed.id, *keyframe);
+  keyframe->parent = changed.parent;
+  hash_ += HashOf(changed.id, *keyframe);
+  return {};
+}
+
+Result<> Map::RemoveLandmark(LandmarkId id) {
+  if (!landmarks_.Has(id) || !observations_.Find(id)->empty()) return Failed(Name(id) + " can't be removed");
+  hash_ -= HashOf(id, *landmarks_.Find(id));
+  landmarks_.Remove(id);
+  observations_.Remove(id);
+  return {};
+}
+
+Result<> Map::RemoveKeyframe(KeyframeId id) {
+  const Keyframe* keyframe = keyframes_.Find(id);
+  if (keyframe == nullptr || std::any_of(keyframe->landmarks.begin(), keyframe->landmarks.end(),
+                                         [](LandmarkId landmark) { return landmark.valid(); })) {
+    return Failed(Name(id) + " can't be removed");
+  }
+  hash_ -= HashOf(id, *keyframe);
+  keyframes_.Remove(id);
   return {};
 }
 
@@ -199,15 +214,14 @@ Result<> Map::AddObservation(const MapDelta::ChangedObservation& change) {
       keyframe->landmarks[static_cast<size_t>(observation.keypoint)].valid()) {
     return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark));
   }
-  const auto place =
-      std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
-  if (place != observations->end() && place->keyframe == observation.keyframe) {
+  const auto next = std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
+  if (next != observations->end() && next->keyframe == observation.keyframe) {
     return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark) + " twice");
   }
   for (const Observation& other : *observations) {
     CountShared(observation.keyframe, other.keyframe, 1);
   }
-  observations->insert(place, observation);
+  observations->insert(next, observation);
   keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = landmark;
   hash_ += HashOf(change);
   return {};

@@ -29,7 +29,7 @@ struct Observation {
 
 // A landmark (map point) as the mapper estimated it.
 struct Landmark {
-  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // metres (mono: units of the map)
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // meters (mono: units of the map)
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // mean unit direction from the landmark to the cameras that saw it
   double min_distance = 0.0;                         // between these distances from a camera its scale fits the pyramid
   double max_distance = 0.0;
@@ -55,11 +55,11 @@ struct Keyframe {
   std::map<KeyframeId, int32_t> covisible;  // keyframes that share landmarks, and how many
 };
 
-// Two keyframes that see the same place, and by which the map was bent so that they agree.
+// Two keyframes that see the same place, by which the map was corrected.
 struct ClosedLoop {
   KeyframeId current;      // the one that came back
   KeyframeId matched;      // the older one
-  double scale = 1.0;      // mono: by which the surroundings of `current` were enlarged
+  double scale = 1.0;      // mono: factor by which the map around `current` was scaled
   int32_t num_points = 0;  // landmarks that both see
   bool operator==(const ClosedLoop&) const = default;
 };
@@ -93,7 +93,7 @@ struct MapDelta {
   };
 
   int64_t number = 0;        // counts from 0; a replica applies them in order
-  KeyframeId answers;        // the keyframe whose processing made this delta; its place in logical time
+  KeyframeId answers;        // the keyframe whose processing made this delta: its logical time
   bool is_snapshot = false;  // starts from the empty map, whatever the replica held
   std::vector<NewKeyframe> new_keyframes;
   std::vector<MovedKeyframe> moved_keyframes;
@@ -142,6 +142,12 @@ class Map {
   friend class MapEditor;  // the owner applies its edits one by one, and counts them as one delta
 
   Result<> ApplyLists(const MapDelta& delta);
+  Result<> AddKeyframe(const MapDelta::NewKeyframe& added);
+  Result<> MoveKeyframe(const MapDelta::MovedKeyframe& moved);
+  Result<> ChangeLandmark(const MapDelta::ChangedLandmark& changed);
+  Result<> ChangeParent(const MapDelta::ChangedParent& changed);
+  Result<> RemoveLandmark(LandmarkId id);
+  Result<> RemoveKeyframe(KeyframeId id);
   Result<> AddObservation(const MapDelta::ChangedObservation& change);
   Result<> RemoveObservation(const MapDelta::ChangedObservation& change);
   void CountShared(KeyframeId a, KeyframeId b, int change);

@@ -1,7 +1,7 @@
 // The owner's answers to followers that lack something: its last deltas once more, or a snapshot page by page.
 //
-// Snapshots are of some time ago, and the deltas since are kept: a follower that was killed and comes back may have to
-// repeat what it did on the map as it was then.
+// Snapshots are older than the map, and the deltas since are kept: a follower that was killed and restarted may have to
+// repeat its steps on the map as it was then.
 #pragma once
 
 #include <cstddef>

@@ -6,8 +6,8 @@
 
 namespace tessera {
 
-// A part needs no number and no hash of its own: the delta of all edits gets them.
-void MapEditor::Apply(MapDelta&& part) { ThrowIfFailed<std::logic_error>(map_.ApplyLists(part), "map editor: "); }
+// An edit needs no number and no hash of its own: the delta of all edits gets them.
+void MapEditor::Apply(MapDelta&& edit) { ThrowIfFailed<std::logic_error>(map_.ApplyLists(edit), "map editor: "); }
 
 void MapEditor::AddKeyframe(KeyframeId id, KeyframeId parent, const Sim3& world_from_keyframe,
                             std::shared_ptr<const FeatureFrame> features) {

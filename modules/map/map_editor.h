@@ -51,7 +51,7 @@ class MapEditor {
   MapDelta Finish(KeyframeId answers);
 
  private:
-  void Apply(MapDelta&& part);
+  void Apply(MapDelta&& edit);
 
   Map& map_;
   const int64_t number_;

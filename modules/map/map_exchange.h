@@ -1,5 +1,5 @@
-// What the owner of the map and those who follow it tell each other beside the deltas themselves: who lacks something
-// asks (MAP_REQUEST), and gets deltas once more or the whole map page by page (MAP_SNAPSHOT).
+// What the owner of the map and its followers exchange besides deltas: a follower that lacks something asks
+// (MAP_REQUEST), and gets deltas once more or the whole map page by page (MAP_SNAPSHOT).
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,7 @@ KeyframeId RootOf(const Map& map, KeyframeId id) {
 }
 
 // A tree may be as deep as the map is long, so what was found on one way to the root is not looked for on the next.
-std::vector<KeyframeId> PartOf(const Map& map, KeyframeId id) {
+std::vector<KeyframeId> MapPartOf(const Map& map, KeyframeId id) {
   enum class Membership : char { kUnknown, kInside, kOutside };
   std::vector<Membership> membership(static_cast<size_t>(map.keyframes().end_id()), Membership::kUnknown);
   const auto of = [&](KeyframeId keyframe) -> Membership& { return membership[static_cast<size_t>(keyframe.value)]; };
@@ -30,7 +30,7 @@ std::vector<KeyframeId> PartOf(const Map& map, KeyframeId id) {
   return part;
 }
 
-void HangBelow(KeyframeId id, KeyframeId parent, MapEditor& editor) {
+void AttachTree(KeyframeId id, KeyframeId parent, MapEditor& editor) {
   while (id.valid()) {
     const KeyframeId old_parent = editor.map().FindKeyframe(id)->parent;
     editor.SetParent(id, parent);

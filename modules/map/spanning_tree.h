@@ -1,4 +1,4 @@
-// The spanning trees of a map's keyframes, by parent: one for each part of the map that hangs together.
+// The spanning trees of a map's keyframes, by parent: one for each part of the map.
 #pragma once
 
 #include <vector>
@@ -7,14 +7,14 @@
 
 namespace tessera {
 
-// Root of the tree that keyframe `id` of the map stands in: names the part of the map that it belongs to.
+// Root of the tree of keyframe `id`: names the map part that the keyframe belongs to.
 KeyframeId RootOf(const Map& map, KeyframeId id);
 
-// All keyframes of that part, by id.
-std::vector<KeyframeId> PartOf(const Map& map, KeyframeId id);
+// All keyframes of that map part, by id.
+std::vector<KeyframeId> MapPartOf(const Map& map, KeyframeId id);
 
-// Makes `id` the child of `parent`, a keyframe of another tree, and turns its own tree round, so that all of it hangs
-// below `id`.
-void HangBelow(KeyframeId id, KeyframeId parent, MapEditor& editor);
+// Makes `id` the child of `parent`, a keyframe of another tree: the links from `id` to its old root are reversed, so
+// that all of its tree descends from it.
+void AttachTree(KeyframeId id, KeyframeId parent, MapEditor& editor);
 
 }  // namespace tessera

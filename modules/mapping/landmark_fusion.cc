@@ -4,7 +4,7 @@
 #include <set>
 #include <vector>
 
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 #include "measurement/feature_grid.h"
 #include "measurement/landmark_view.h"
 

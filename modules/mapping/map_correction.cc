@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "map/landmark_description.h"
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 #include "map/spanning_tree.h"
 
 namespace tessera {
@@ -47,8 +47,8 @@ void ObserveFirstVisit(const LoopResult& loop, MapEditor& editor) {
 void JoinTrees(const LoopResult& loop, MapEditor& editor) {
   const Map& map = editor.map();
   const KeyframeId current_root = RootOf(map, loop.answers), matched_root = RootOf(map, loop.matched);
-  if (current_root > matched_root) HangBelow(loop.answers, loop.matched, editor);
-  if (current_root < matched_root) HangBelow(loop.matched, loop.answers, editor);
+  if (current_root > matched_root) AttachTree(loop.answers, loop.matched, editor);
+  if (current_root < matched_root) AttachTree(loop.matched, loop.answers, editor);
 }
 
 // Landmarks that both visits created become one.

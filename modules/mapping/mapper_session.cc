@@ -41,7 +41,7 @@ Result<MapperActions> MapperSession::Load(const MapDelta& snapshot) {
   next_keyframe_ = {map().answered().value + 1};
   schedule_.BeginAt(next_keyframe_);
   MapperActions actions;
-  if (map().next_delta() > 0) actions.emplace_back(RemovedInDelta{.delta = map().next_delta() - 1, .ties = {}});
+  if (map().next_delta() > 0) actions.emplace_back(RemovedInDelta{.delta = map().next_delta() - 1, .links = {}});
   return actions;
 }
 

@@ -84,7 +84,7 @@ class MapperSession {
   std::deque<KeyframeObservation> waiting_;
   int64_t num_processed_ = 0;  // keyframes
   MapArchive archive_;
-  KeyframePlaces places_;
+  KeyframePoses places_;
   std::optional<EndOfStream> tracker_end_;
   bool has_finished_ = false;
   bool has_failed_ = false;

@@ -58,15 +58,15 @@ std::vector<KeypointPair> MatchByBags(const FeatureFrame& first, const BagOfWord
   std::map<int32_t, int32_t> second_of;  // by first, in its order
   for (const auto& [keypoint, claim] : claims) second_of[claim.first] = keypoint;
   std::vector<KeypointPair> pairs;
-  std::vector<uint8_t> turns;
+  std::vector<uint8_t> rotations;
   for (const auto& [i, j] : second_of) {
     pairs.push_back({i, j});
-    turns.push_back(static_cast<uint8_t>(second.keypoints[Index(j)].angle - first.keypoints[Index(i)].angle));
+    rotations.push_back(static_cast<uint8_t>(second.keypoints[Index(j)].angle - first.keypoints[Index(i)].angle));
   }
-  const std::vector<char> agrees = AgreeingTurns(turns);
+  const std::vector<char> is_inlier = RotationHistogramInliers(rotations);
   std::vector<KeypointPair> kept;
   for (size_t k = 0; k < pairs.size(); ++k) {
-    if (agrees[k]) kept.push_back(pairs[k]);
+    if (is_inlier[k]) kept.push_back(pairs[k]);
   }
   return kept;
 }

@@ -21,9 +21,9 @@ struct KeypointPair {
   int32_t second = -1;
 };
 
-// Pairs by `first`; no keypoint stands in two of them. `uses_first` and `uses_second` say which keypoints take part. Of
-// claims to one keypoint the nearest descriptor wins, then the lower index; pairs whose orientations differ unlike most
-// others' are dropped.
+// Pairs by `first`; no keypoint is in two of them. `uses_first` and `uses_second` say which keypoints take part. Of
+// claims to one keypoint the nearest descriptor wins, then the lower index; pairs outside the peak of the rotation
+// histogram are dropped.
 std::vector<KeypointPair> MatchByBags(const FeatureFrame& first, const BagOfWords& first_bag,
                                       const std::function<bool(int32_t)>& uses_first, const FeatureFrame& second,
                                       const BagOfWords& second_bag, const std::function<bool(int32_t)>& uses_second,

@@ -6,8 +6,8 @@
 
 namespace tessera {
 
-// Moves the frame to the pose that agrees best with its points, from where it stands, and takes off the points that
-// disagree. Returns how many are left.
+// Optimizes the frame's pose over its points, from the pose that it has, and removes the outliers. Returns the number
+// of points that are left.
 int OptimizeFrame(const PoseOptimizationOptions& options, TrackedFrame& frame);
 
 }  // namespace tessera

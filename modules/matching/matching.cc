@@ -19,7 +19,7 @@ std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::
       matches.push_back({i, best.index, best.distance});
     }
   }
-  return DropUnlikeTurns(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
+  return KeepRotationInliers(KeepBestPerSecond(std::move(matches), second.size()), first, second, options);
 }
 
 std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second) {
@@ -40,20 +40,20 @@ std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second)
   return kept;
 }
 
-std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& first, const FrameView& second,
-                                   const MatchingOptions& options) {
+std::vector<Match> KeepRotationInliers(std::vector<Match> matches, const FrameView& first, const FrameView& second,
+                                       const MatchingOptions& options) {
   if (!options.check_rotation) {
     return matches;
   }
-  std::vector<uint8_t> turns;
-  turns.reserve(matches.size());
+  std::vector<uint8_t> rotations;
+  rotations.reserve(matches.size());
   for (const Match& match : matches) {
-    turns.push_back(static_cast<uint8_t>(second.keypoint(match.second).angle - first.keypoint(match.first).angle));
+    rotations.push_back(static_cast<uint8_t>(second.keypoint(match.second).angle - first.keypoint(match.first).angle));
   }
-  const std::vector<char> agrees = AgreeingTurns(turns);
+  const std::vector<char> is_inlier = RotationHistogramInliers(rotations);
   size_t kept = 0;
   for (size_t i = 0; i < matches.size(); ++i) {
-    if (agrees[i]) {
+    if (is_inlier[i]) {
       matches[kept++] = matches[i];
     }
   }
@@ -61,28 +61,28 @@ std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& 
   return matches;
 }
 
-std::vector<char> AgreeingTurns(std::span<const uint8_t> turns) {
-  constexpr int kSectors = 32, kSectorSize = 256 / kSectors;
-  std::array<int, kSectors> count{};
-  for (const uint8_t turn : turns) {
-    ++count[turn / kSectorSize];
+std::vector<char> RotationHistogramInliers(std::span<const uint8_t> rotations) {
+  constexpr int kBins = 32, kBinSize = 256 / kBins;
+  std::array<int, kBins> count{};
+  for (const uint8_t rotation : rotations) {
+    ++count[rotation / kBinSize];
   }
-  // The fullest sector together with its two neighbours, since the peak may lie on a border.
+  // The fullest bin together with its two neighbors, since the peak may lie on a border.
   int best = 0, best_count = -1;
-  for (int sector = 0; sector < kSectors; ++sector) {
-    const auto at = [&](int s) { return count[static_cast<size_t>((s + kSectors) % kSectors)]; };
-    const int sum = at(sector - 1) + at(sector) + at(sector + 1);
+  for (int bin = 0; bin < kBins; ++bin) {
+    const auto at = [&](int s) { return count[static_cast<size_t>((s + kBins) % kBins)]; };
+    const int sum = at(bin - 1) + at(bin) + at(bin + 1);
     if (sum > best_count) {
-      best = sector;
+      best = bin;
       best_count = sum;
     }
   }
-  std::vector<char> agrees(turns.size());
-  std::transform(turns.begin(), turns.end(), agrees.begin(), [best](uint8_t turn) {
-    const int distance = (turn / kSectorSize - best + kSectors) % kSectors;
-    return static_cast<char>(distance <= 1 || distance == kSectors - 1);
+  std::vector<char> is_inlier(rotations.size());
+  std::transform(rotations.begin(), rotations.end(), is_inlier.begin(), [best](uint8_t rotation) {
+    const int distance = (rotation / kBinSize - best + kBins) % kBins;
+    return static_cast<char>(distance <= 1 || distance == kBins - 1);
   });
-  return agrees;
+  return is_inlier;
 }
 
 }  // namespace tessera

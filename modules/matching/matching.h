@@ -18,7 +18,7 @@ struct Match {
 struct MatchingOptions {
   int max_hamming = 60;        // of 256; the same corner stays mostly below, different ones are about 128 apart
   double max_ratio = 0.8;      // best to second best distance (Lowe 2004)
-  bool check_rotation = true;  // drop matches whose turn is unlike that of most others
+  bool check_rotation = true;  // drop matches outside the peak of the rotation histogram
 };
 
 // Keypoints of `first` in a window of +-radius_px around centers_px (by keypoint of `first`), within one pyramid level.
@@ -49,13 +49,13 @@ struct BestMatch {
 // Keeps, of matches that share their `second`, the one with the lowest distance (then the lowest `first`).
 std::vector<Match> KeepBestPerSecond(std::vector<Match> matches, int num_second);
 
-// Keeps the matches whose turn, angle of `second` less that of `first`, agrees (AgreeingTurns), if the options ask for
-// it.
-std::vector<Match> DropUnlikeTurns(std::vector<Match> matches, const FrameView& first, const FrameView& second,
-                                   const MatchingOptions& options);
+// Keeps the matches whose rotation, the angle of `second` less that of `first`, is an inlier of the histogram of all,
+// if the options ask for it.
+std::vector<Match> KeepRotationInliers(std::vector<Match> matches, const FrameView& first, const FrameView& second,
+                                       const MatchingOptions& options);
 
-// Marks the turns (1/256 turn each) that lie in the three neighbouring sectors, of 32, that hold most of them: images
-// turn as a whole, so wrong matches stand out.
-std::vector<char> AgreeingTurns(std::span<const uint8_t> turns);
+// Marks the rotations (1/256 turn each) in the three neighboring bins, of 32, of their histogram that hold most of
+// them: an image rotates as a whole, so wrong matches stand out (ORB-SLAM: Mur-Artal et al. 2015).
+std::vector<char> RotationHistogramInliers(std::span<const uint8_t> rotations);
 
 }  // namespace tessera

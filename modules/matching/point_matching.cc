@@ -71,7 +71,7 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
   return frame.NumPoints();
 }
 
-int MatchLocal(const PlacedPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame) {
+int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame) {
   const std::vector<SeenPoint> before = frame.points;
   Claims claims(frame.points.size());
   const View view(frame.view->calibration(), frame.world_from_camera);
@@ -105,7 +105,7 @@ int MatchLocal(const PlacedPoints& points, double radius_px, const MatchOptions&
   return frame.NumPoints();
 }
 
-int MatchAnywhere(const PlacedPoints& points, const MatchOptions& options, TrackedFrame& frame) {
+int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, TrackedFrame& frame) {
   frame.points.assign(frame.points.size(), {});
   Claims claims(frame.points.size());
   for (const auto& [id, landmark] : points) {

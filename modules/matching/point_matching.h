@@ -21,7 +21,7 @@ struct MatchOptions {
   Result<> Check() const;
 };
 
-using PlacedPoints = std::vector<std::pair<PointId, Landmark>>;  // in world coordinates
+using KnownPoints = std::vector<std::pair<PointId, Landmark>>;  // in world coordinates
 
 // A point that a frame sees.
 struct SeenPoint {
@@ -31,7 +31,7 @@ struct SeenPoint {
   bool valid() const { return id.valid(); }
 };
 
-// A frame under way: its features, its place, and by keypoint the points that it sees.
+// A frame that is being localized: its features, its pose, and by keypoint the points that it sees.
 struct TrackedFrame {
   explicit TrackedFrame(std::shared_ptr<const FrameView> frame_view)
       : view(std::move(frame_view)), points(static_cast<size_t>(view->size())) {}
@@ -49,9 +49,9 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
 
 // Known points that `frame` sees none of yet, looked for around their projection at its pose. Adds to frame.points;
 // returns how many.
-int MatchLocal(const PlacedPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame);
+int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame);
 
-// Known points, wherever they may stand, by descriptor alone. Sets frame.points; returns how many.
-int MatchAnywhere(const PlacedPoints& points, const MatchOptions& options, TrackedFrame& frame);
+// Known points, wherever they may be in the image, by descriptor alone. Sets frame.points; returns how many.
+int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, TrackedFrame& frame);
 
 }  // namespace tessera

@@ -33,7 +33,7 @@ FeatureGrid::FeatureGrid(const std::vector<Keypoint>& keypoints, int width_px, i
 
 FeatureGrid::Span FeatureGrid::SegmentInRow(const Eigen::Vector2d& from_px, const Eigen::Vector2d& to_px,
                                             double radius_px, int row) const {
-  // The part of the segment whose y lies within radius of the row of cells, as parameters 0..1 along it.
+  // The piece of the segment whose y lies within radius of the row of cells, as parameters 0..1 along it.
   const double top = row * kCellPx - radius_px, bottom = (row + 1) * kCellPx + radius_px;
   const double rise = to_px.y() - from_px.y();
   double begin = 0.0, end = 1.0;

@@ -1,4 +1,4 @@
-// Finds the keypoints near a place in the image.
+// Finds the keypoints near a position in the image.
 #pragma once
 
 #include <Eigen/Core>

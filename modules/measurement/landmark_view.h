@@ -17,7 +17,7 @@ std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe);
 // Their median; 1 if there are none.
 double MedianDepth(const Map& map, const Keyframe& keyframe);
 
-// The features' keypoints by place.
+// The features' keypoints by position.
 FeatureGrid MakeGrid(const FeatureFrame& features);
 
 // A camera at a pose, ready to project many landmarks.
@@ -33,7 +33,7 @@ struct View {
 struct ExpectedView {
   Eigen::Vector2d pixel_px;
   double depth = 0.0;      // z in the camera frame
-  double distance = 0.0;   // from the camera's centre
+  double distance = 0.0;   // from the camera's center
   int level = 0;           // where its patch has the size that it had before
   double cos_angle = 1.0;  // between the line of sight and the landmark's mean one
 };

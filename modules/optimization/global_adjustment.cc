@@ -11,7 +11,7 @@ namespace {
 
 LocalWindow WholePart(const Map& map, KeyframeId member) {
   LocalWindow window;
-  window.inner = PartOf(map, member);
+  window.inner = MapPartOf(map, member);
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
     const std::vector<Observation>& observations = map.ObservationsOf(id);
     if (observations.size() < 2) return;

@@ -25,7 +25,7 @@ void NormalizeDepth(MonoStart& start) {
 
 Result<> InitializerOptions::Check() const {
   if (!(radius_share > 0.0) || min_matches < 8 || max_frames < 1) {
-    return Failed("the options of mono initialisation must be positive, and min_matches at least 8");
+    return Failed("the options of mono initialization must be positive, and min_matches at least 8");
   }
   return two_view.Check();
 }
@@ -37,14 +37,14 @@ std::optional<MonoStart> MonoInitializer::Add(const std::shared_ptr<const FrameV
     return std::nullopt;
   }
   const double radius_px = options_.radius_share * frame->calibration().width_px;
-  const std::vector<Match> matches = MatchInWindow(*reference_, places_px_, *frame, radius_px, options_.matching);
+  const std::vector<Match> matches = MatchInWindow(*reference_, last_seen_px_, *frame, radius_px, options_.matching);
   if (static_cast<int>(matches.size()) < options_.min_matches) {
     SetReference(frame);
     return std::nullopt;
   }
   std::vector<PixelPair> pairs;
   for (const Match& match : matches) {
-    places_px_[static_cast<size_t>(match.first)] = frame->pixel(match.second);
+    last_seen_px_[static_cast<size_t>(match.first)] = frame->pixel(match.second);
     pairs.push_back({reference_->pixel(match.first), frame->pixel(match.second)});
   }
   const auto seed = static_cast<uint64_t>(frame->features().frame.value);
@@ -62,9 +62,9 @@ std::optional<MonoStart> MonoInitializer::Add(const std::shared_ptr<const FrameV
 
 void MonoInitializer::SetReference(const std::shared_ptr<const FrameView>& frame) {
   reference_ = frame->size() >= options_.min_matches ? frame : nullptr;
-  places_px_.clear();
+  last_seen_px_.clear();
   for (int i = 0; i < frame->size(); ++i) {
-    places_px_.push_back(frame->pixel(i));
+    last_seen_px_.push_back(frame->pixel(i));
   }
 }
 

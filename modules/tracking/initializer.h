@@ -16,9 +16,9 @@
 namespace tessera {
 
 struct InitializerOptions {
-  double radius_share = 0.1;  // search window: +- this share of the image's width around the place in the frame before
-  int min_matches = 100;      // with fewer, the reference frame is given up for the newest one
-  int max_frames = 40;        // so is one that is older than this
+  double radius_share = 0.1;  // search window: +- this share of the image's width around the position in the last frame
+  int min_matches = 100;      // with fewer, the newest frame becomes the reference
+  int max_frames = 40;        // of the reference; an older one is replaced likewise
   MatchingOptions matching{50, 0.9, true};
   TwoViewOptions two_view;
 
@@ -41,7 +41,7 @@ class MonoInitializer {
  public:
   explicit MonoInitializer(const InitializerOptions& options) : options_(options) {}
 
-  // Matches the frame with the reference frame, and tells the start if the two allow one. The first frame with enough
+  // Matches the frame with the reference frame, and returns the start if the two allow one. The first frame with enough
   // keypoints becomes the reference; keypoints are followed from frame to frame.
   std::optional<MonoStart> Add(const std::shared_ptr<const FrameView>& frame);
 
@@ -52,7 +52,7 @@ class MonoInitializer {
 
   InitializerOptions options_;
   std::shared_ptr<const FrameView> reference_;
-  std::vector<Eigen::Vector2d> places_px_;  // by keypoint of the reference: where it was seen last
+  std::vector<Eigen::Vector2d> last_seen_px_;  // by keypoint of the reference
 };
 
 }  // namespace tessera

@@ -18,8 +18,7 @@ double Median(std::vector<double> values) {
 
 Result<> KeyframeDecisionOptions::Check() const {
   for (const double share : {min_share, min_first_share, min_still_share}) {
-    if (!(share > 0.0 && share < 1.0))
-      return Failed("the tracker's shares of a reference's points must be between 0 and 1");
+    if (!(share > 0.0 && share < 1.0)) return Failed("the shares of a reference's points must be between 0 and 1");
   }
   if (!(min_parallax_rad > 0.0) || max_interval_us < 1) return Failed("the limits of keyframes must be positive");
   return {};

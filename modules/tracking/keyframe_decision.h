@@ -1,5 +1,5 @@
 // When a frame should become a keyframe: by how much of the reference is still seen, by how fast that falls, and by
-// parallax. Never by whether somebody is busy.
+// parallax; never by the load of the system.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,9 @@ struct KeyframeDecisionOptions {
   // third from frame to frame is nothing to act on, a greater one is motion.
   double min_first_share = 0.4;
   double min_parallax_rad =
-      0.035;                     // mono: 2 degrees of median parallax to the reference: new points can be placed well
-  double min_still_share = 0.9;  // few points, parallax or age is no reason while more than this is still seen
-  int min_points = 150;          // a frame that sees fewer known points becomes a keyframe if anything moved
+      0.035;  // mono: 2 degrees of median parallax to the reference: new points can be triangulated well
+  double min_still_share = 0.9;       // few points, parallax or age is no reason while more than this is still seen
+  int min_points = 150;               // a frame that sees fewer known points becomes a keyframe if anything moved
   int64_t max_interval_us = 2000000;  // not longer than this, if anything moved
   int min_new_points = 70;            // stereo, RGB-D: near keypoints that see no known point ...
   int max_known_points = 100;         // ... while fewer near keypoints than this see one
@@ -42,7 +42,7 @@ class KeyframeDecision {
 
   // `frame` became the reference.
   void Restart(const TrackedFrame& frame);
-  // The reference's points got new names (MapReplica::Renew).
+  // The delta that answered the reference may have renamed its points (MapReplica::Renew).
   void Renew(const MapReplica& replica);
   // To be asked of every tracked frame after the reference, in order. `frame_interval_us`: to the frame before.
   bool Decide(const TrackedFrame& frame, int64_t frame_interval_us, const Rigid3& world_from_reference,

@@ -11,7 +11,7 @@ Result<> MapReplica::Apply(const MapDelta& delta) {
   return applied;
 }
 
-std::optional<Sim3> MapReplica::PlaceOf(KeyframeId id) const {
+std::optional<Sim3> MapReplica::WorldFromKeyframe(KeyframeId id) const {
   Sim3 ancestor_from_keyframe;
   for (auto sent = sent_.find(id); sent != sent_.end(); sent = sent_.find(id)) {
     ancestor_from_keyframe = Sim3::From(sent->second.reference_from_camera) * ancestor_from_keyframe;
@@ -31,9 +31,9 @@ std::optional<Landmark> MapReplica::Find(const PointId& id) const {
   const auto sent = sent_.find(id.keyframe);
   if (sent == sent_.end()) return std::nullopt;
   const auto point = sent->second.points.find(id.keypoint);
-  const std::optional<Sim3> place = PlaceOf(id.keyframe);
-  if (point == sent->second.points.end() || !place) return std::nullopt;
-  return InWorld(*place, point->second);
+  const std::optional<Sim3> world_from_keyframe = WorldFromKeyframe(id.keyframe);
+  if (point == sent->second.points.end() || !world_from_keyframe) return std::nullopt;
+  return InWorld(*world_from_keyframe, point->second);
 }
 
 PointId MapReplica::Renew(const PointId& id) const {
@@ -46,10 +46,10 @@ PointId MapReplica::Renew(const PointId& id) const {
 std::vector<std::pair<PointId, Landmark>> MapReplica::SentPoints() const {
   std::vector<std::pair<PointId, Landmark>> points;
   for (const auto& [id, keyframe] : sent_) {
-    const std::optional<Sim3> place = PlaceOf(id);
-    if (!place) continue;
+    const std::optional<Sim3> world_from_keyframe = WorldFromKeyframe(id);
+    if (!world_from_keyframe) continue;
     for (const auto& [keypoint, point] : keyframe.points) {
-      points.emplace_back(PointId{{}, id, keypoint}, InWorld(*place, point));
+      points.emplace_back(PointId{{}, id, keypoint}, InWorld(*world_from_keyframe, point));
     }
   }
   return points;

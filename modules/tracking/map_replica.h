@@ -1,5 +1,5 @@
-// The map as the tracker sees it: the replica that deltas made, and the keyframes that it sent and no delta answered
-// yet, with the points that it placed itself.
+// The map as the tracker sees it: the replica that deltas made, and the keyframes that it sent and no delta has
+// answered yet, with the points that the tracker triangulated itself.
 #pragma once
 
 #include <map>
@@ -15,9 +15,9 @@ namespace tessera {
 
 // A keyframe on its way to the mapper.
 struct SentKeyframe {
-  KeyframeId reference;                // invalid: the first of a part
-  Rigid3 reference_from_camera;        // in the reference's units; world_from_camera for the first of a part
-  std::map<int32_t, Landmark> points;  // by keypoint: placed by the tracker, in the keyframe's frame and units
+  KeyframeId reference;                // invalid: the first of a map part
+  Rigid3 reference_from_camera;        // in the reference's units; world_from_camera for the first of a map part
+  std::map<int32_t, Landmark> points;  // by keypoint, in the keyframe's frame and units
 };
 
 class MapReplica {
@@ -31,12 +31,12 @@ class MapReplica {
 
   // Keyframe::WorldFromKeyframe of a keyframe of the map, one that was removed from it, or one on its way, which has
   // the units of its reference.
-  std::optional<Sim3> PlaceOf(KeyframeId id) const;
+  std::optional<Sim3> WorldFromKeyframe(KeyframeId id) const;
   // The point in world coordinates; nullopt if it is gone.
   std::optional<Landmark> Find(const PointId& id) const;
   // The same point under its present name: its landmark once the mapper answered. Invalid if it is gone.
   PointId Renew(const PointId& id) const;
-  // All points placed by the tracker itself that no delta answered yet, in world coordinates.
+  // The points of all unanswered keyframes, in world coordinates.
   std::vector<std::pair<PointId, Landmark>> SentPoints() const;
 
  private:

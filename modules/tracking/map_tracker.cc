@@ -1,19 +1,18 @@
 #include "tracking/map_tracker.h"
 
 #include <algorithm>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
 #include "geometry/absolute_pose.h"
 #include "map/landmark_description.h"
-#include "map/neighbourhood.h"
 #include "matching/frame_pose.h"
+#include "tracking/local_points.h"
 
 namespace tessera {
 namespace {
 
-// A point placed from one view alone, in the frame of its camera; fields as in DescribeLandmark.
+// A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark.
 Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera) {
   Landmark point;
   const double distance = point_in_camera.norm();
@@ -31,9 +30,9 @@ Result<> MapTrackerOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(start.Check());
   TESSERA_RETURN_IF_FAILED(matching.Check());
   TESSERA_RETURN_IF_FAILED(keyframes.Check());
-  if (max_unanswered_keyframes < 2) return Failed("the tracker must send at least two keyframes without an answer");
-  if (min_inliers < 6 || max_local_keyframes < 1) return Failed("tracker.min_inliers must be at least 6");
-  return {};
+  TESSERA_RETURN_IF_FAILED(Require(max_unanswered_keyframes >= 2, "max_unanswered_keyframes must be at least 2"));
+  TESSERA_RETURN_IF_FAILED(Require(min_inliers >= 6, "min_inliers must be at least 6"));
+  return Require(max_local_keyframes >= 1, "max_local_keyframes must be at least 1");
 }
 
 MapTracker::MapTracker(const MapTrackerOptions& options)
@@ -49,47 +48,63 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
   const auto view = std::make_shared<const FrameView>(features);
-  MapTrackingResult result;
-  PoseEstimate& pose = result.pose;
-  pose.frame = features.frame;
-  pose.utime_us = features.utime_us;
-  pose.arrival_us = features.arrival_us;
-  pose.num_features = view->size();
-  pose.num_landmarks = static_cast<int32_t>(replica_.map().landmarks().size());
-  const bool has_map = replica_.map().keyframes().size() > 0;
-  const bool was_lost = lost_since_us_.has_value() || (!last_ && has_map);
-  if (last_) RenewLast();
-  if (answer != nullptr && TakeAnswer(*answer, view)) pose.relocalized_by = answer->frame;
+  const State before = state();
+  MapTrackingResult result = UndecidedResult(*view);
+  if (last_) UpdateLast();
+  const bool is_answered = answer != nullptr && TakeAnswer(*answer, view);
+  if (is_answered) result.pose.relocalized_by = answer->frame;
+  // The answer may be for this frame, which it has localized then, or for one before, which this one follows.
+  const bool is_localized = is_answered && answer->frame == features.frame;
 
-  TrackedFrame frame(view);
-  if (last_ && (last_->frame.view == view || Place(frame))) {
-    if (last_->frame.view != view) Remember(std::move(frame));
-    pose.num_matches = last_->frame.NumPoints();
-    pose.is_relocalized = was_lost || pose.relocalized_by.valid();
-    pose.state = TrackingState::kTracked;
+  if (is_localized || (last_ && Localize(view))) {
+    result.pose.num_matches = last_->frame.NumPoints();
+    result.pose.is_relocalized = before == State::kLost || is_answered;
+    result.pose.state = TrackingState::kTracked;
     if (options_.makes_keyframes && IsKeyframeDue()) {
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
     }
-  } else if (may_ask && has_map && view->size() >= options_.min_relocalised_inliers) {
+  } else if (may_ask && CanAskFor(*view)) {
     asked_ = view;
     result.asks_relocalization = true;
     return result;
-  } else if (!has_map && !last_) {
-    pose.state = Start(view, result.keyframes) ? TrackingState::kTracked : TrackingState::kInitializing;
+  } else if (before == State::kInitializing) {
+    result.pose.state = Start(view, result.keyframes) ? TrackingState::kTracked : TrackingState::kInitializing;
   } else {
     const bool has_started = NoteLoss(features.utime_us) && Start(view, result.keyframes);
-    pose.state = has_started ? TrackingState::kTracked : TrackingState::kLost;
+    result.pose.state = has_started ? TrackingState::kTracked : TrackingState::kLost;
   }
-  if (pose.state == TrackingState::kTracked) {
-    lost_since_us_.reset();
-    pose.world_from_camera = last_->frame.world_from_camera;
-    pose.reference_keyframe = reference_;
-    pose.reference_from_camera = last_->reference_from_camera;
-    pose.num_inliers = last_->frame.NumPoints();
-    pose.is_keyframe = !result.keyframes.empty();
-  }
+  if (result.pose.state == TrackingState::kTracked) DescribePose(result);
   previous_utime_us_ = features.utime_us;
   return result;
+}
+
+MapTracker::State MapTracker::state() const {
+  if (!last_ && !has_map()) return State::kInitializing;
+  return lost_since_us_ || !last_ ? State::kLost : State::kTracking;
+}
+
+MapTrackingResult MapTracker::UndecidedResult(const FrameView& view) const {
+  MapTrackingResult result;
+  result.pose.frame = view.features().frame;
+  result.pose.utime_us = view.features().utime_us;
+  result.pose.arrival_us = view.features().arrival_us;
+  result.pose.num_features = view.size();
+  result.pose.num_landmarks = static_cast<int32_t>(replica_.map().landmarks().size());
+  return result;
+}
+
+bool MapTracker::CanAskFor(const FrameView& view) const {
+  return has_map() && view.size() >= options_.min_relocalized_inliers;
+}
+
+// The frame was tracked, and is now the last one.
+void MapTracker::DescribePose(MapTrackingResult& result) {
+  lost_since_us_.reset();
+  result.pose.world_from_camera = last_->frame.world_from_camera;
+  result.pose.reference_keyframe = reference_;
+  result.pose.reference_from_camera = last_->reference_from_camera;
+  result.pose.num_inliers = last_->frame.NumPoints();
+  result.pose.is_keyframe = !result.keyframes.empty();
 }
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
@@ -102,9 +117,9 @@ bool MapTracker::StartFromDepth(const Frame& view, std::vector<KeyframeObservati
   for (int i = 0; i < view->size(); ++i) num_points += view->observation(i).has_right() ? 1 : 0;
   if (num_points < options_.min_start_points) return false;
   TrackedFrame frame(view);
-  frame.world_from_camera = part_from_world_;
+  frame.world_from_camera = world_from_start_;
   last_.emplace(Last{std::move(frame), Rigid3::Identity()});
-  keyframes.push_back(MakeKeyframe(last_->frame, {}, part_from_world_));
+  keyframes.push_back(MakeKeyframe(last_->frame, {}, world_from_start_));
   return true;
 }
 
@@ -115,17 +130,17 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   initializer_ = MonoInitializer(options_.start);
   const KeyframeId first_id = next_keyframe_;
   TrackedFrame first(start->first), second(start->second);
-  first.world_from_camera = part_from_world_;
-  keyframes.push_back(MakeKeyframe(first, {}, part_from_world_));
+  first.world_from_camera = world_from_start_;
+  keyframes.push_back(MakeKeyframe(first, {}, world_from_start_));
 
   const Rigid3 first_from_second = start->second_from_first.Inverse();
-  second.world_from_camera = part_from_world_ * first_from_second;
-  SentKeyframe sent{{}, part_from_world_, {}};
+  second.world_from_camera = world_from_start_ * first_from_second;
+  SentKeyframe sent{{}, world_from_start_, {}};
   for (const MonoStart::Point& point : start->points) {
-    const Landmark placed = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
-    sent.points[point.keypoint_first] = placed;
+    const Landmark in_camera = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
+    sent.points[point.keypoint_first] = in_camera;
     second.points[Index(point.keypoint_second)] = {{{}, first_id, point.keypoint_first},
-                                                   InWorld(Sim3::From(part_from_world_), placed)};
+                                                   InWorld(Sim3::From(world_from_start_), in_camera)};
   }
   replica_.Send(first_id, std::move(sent));
   last_.emplace(Last{std::move(second), Rigid3::Identity()});
@@ -133,10 +148,10 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   return true;
 }
 
-// The last frame keeps its place relative to its reference, and its points take their newest places.
-void MapTracker::RenewLast() {
+// The map may have changed: the last frame keeps its pose relative to its reference, and its points move with the map.
+void MapTracker::UpdateLast() {
   decision_.Renew(replica_);
-  if (const std::optional<Sim3> world_from_reference = replica_.PlaceOf(reference_)) {
+  if (const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_)) {
     last_->frame.world_from_camera = (*world_from_reference * last_->reference_from_camera).Pose();
   }
   for (SeenPoint& point : last_->frame.points) {
@@ -150,18 +165,26 @@ void MapTracker::RenewLast() {
   }
 }
 
-bool MapTracker::Place(TrackedFrame& frame) const {
-  const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalise(frame);
+// The frame becomes the last one if its pose can be found in the map around that one.
+bool MapTracker::Localize(const Frame& view) {
+  TrackedFrame frame(view);
+  const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalize(frame);
   if (!is_near) return false;
-  MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
-  return OptimizeFrame(options_.pose, frame) >=
-         (lost_since_us_ ? options_.min_relocalised_inliers : options_.min_inliers);
+  MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
+  const int min_inliers = lost_since_us_ ? options_.min_relocalized_inliers : options_.min_inliers;
+  if (OptimizeFrame(options_.pose, frame) < min_inliers) return false;
+  Remember(std::move(frame));
+  return true;
+}
+
+KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
+  return LocalPoints(replica_, frame, options_.max_local_keyframes);
 }
 
 bool MapTracker::FollowLast(TrackedFrame& frame) const {
   const Rigid3 last_from_current = current_from_last_.value_or(Rigid3::Identity()).Inverse();
   const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
-  const Sim3 world_from_reference = replica_.PlaceOf(reference_).value_or(Sim3{});
+  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
   for (const double widening : {1.0, 2.0, 4.0}) {
     frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
     const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
@@ -171,9 +194,9 @@ bool MapTracker::FollowLast(TrackedFrame& frame) const {
   return false;
 }
 
-// Without a guess: the points around the last frame, wherever they are now.
-bool MapTracker::Relocalise(TrackedFrame& frame) const {
-  PlacedPoints points = LocalPoints(last_->frame);
+// Without a predicted pose: the points around the last frame, matched by descriptor alone.
+bool MapTracker::Relocalize(TrackedFrame& frame) const {
+  KnownPoints points = PointsAround(last_->frame);
   for (const SeenPoint& point : last_->frame.points) {
     if (point.valid()) points.emplace_back(point.id, point.landmark);
   }
@@ -195,7 +218,7 @@ bool MapTracker::Relocalise(TrackedFrame& frame) const {
 // this map.
 bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& view) {
   const Frame asked = view->features().frame == answer.frame ? view : asked_;
-  const std::optional<Sim3> world_from_reference = replica_.PlaceOf(answer.reference);
+  const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(answer.reference);
   if (!world_from_reference || asked == nullptr || asked->features().frame != answer.frame) return false;
   TrackedFrame frame(asked);
   frame.world_from_camera = (*world_from_reference * answer.reference_from_camera).Pose();
@@ -205,9 +228,9 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
       frame.points[Index(seen.keypoint)] = {{seen.landmark, {}, -1}, *landmark};
     }
   }
-  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalised_inliers / 2) return false;
-  MatchLocal(LocalPoints(frame), options_.matching.local_radius_px, options_.matching, frame);
-  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalised_inliers) return false;
+  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalized_inliers / 2) return false;
+  MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
+  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalized_inliers) return false;
   reference_ = answer.reference;
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
@@ -216,49 +239,8 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   return true;
 }
 
-// The keyframes that share most points with the frame, and then their neighbours, as long as there is room.
-std::vector<KeyframeId> MapTracker::LocalKeyframes(const TrackedFrame& frame) const {
-  const Map& map = replica_.map();
-  std::map<KeyframeId, int> num_shared;
-  for (const SeenPoint& point : frame.points) {
-    for (const Observation& observation : map.ObservationsOf(point.id.landmark)) ++num_shared[observation.keyframe];
-  }
-  std::vector<std::pair<int, KeyframeId>> ranked;
-  for (const auto& [id, count] : num_shared) ranked.emplace_back(-count, id);
-  std::sort(ranked.begin(), ranked.end());
-  ranked.resize(std::min(ranked.size(), static_cast<size_t>(options_.max_local_keyframes) * 2 / 3));
-  std::vector<KeyframeId> keyframes;
-  for (const auto& [count, id] : ranked) keyframes.push_back(id);
-  for (const auto& [count, id] : ranked) {
-    for (const KeyframeId neighbour : map.Covisible(id, 10)) {
-      if (static_cast<int>(keyframes.size()) >= options_.max_local_keyframes) return keyframes;
-      if (std::find(keyframes.begin(), keyframes.end(), neighbour) == keyframes.end()) keyframes.push_back(neighbour);
-    }
-  }
-  return keyframes;
-}
-
-// The landmarks of the keyframes around, and the points still on their way, that the frame does not see yet.
-PlacedPoints MapTracker::LocalPoints(const TrackedFrame& frame) const {
-  const Map& map = replica_.map();
-  std::vector<PointId> seen;
-  for (const SeenPoint& point : frame.points) {
-    if (point.valid()) seen.push_back(point.id);
-  }
-  std::sort(seen.begin(), seen.end());
-  PlacedPoints points;
-  for (const LandmarkId id : LandmarksSeenBy(map, LocalKeyframes(frame))) {
-    const PointId point{id, {}, -1};
-    if (!std::binary_search(seen.begin(), seen.end(), point)) points.emplace_back(point, *map.FindLandmark(id));
-  }
-  for (auto& [point, landmark] : replica_.SentPoints()) {
-    if (!std::binary_search(seen.begin(), seen.end(), point)) points.emplace_back(point, landmark);
-  }
-  return points;
-}
-
 void MapTracker::Remember(TrackedFrame frame) {
-  const Sim3 reference_from_world = replica_.PlaceOf(reference_).value_or(Sim3{}).Inverse();
+  const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   current_from_last_.reset();
   if (!lost_since_us_) current_from_last_ = reference_from_camera.Inverse() * last_->reference_from_camera;
@@ -266,12 +248,12 @@ void MapTracker::Remember(TrackedFrame frame) {
   last_.emplace(Last{std::move(frame), reference_from_camera});
 }
 
-// Whether it has lasted so long that a new part of the map should begin.
+// Whether the loss has lasted so long that a new part of the map should begin.
 bool MapTracker::NoteLoss(int64_t utime_us) {
   if (!lost_since_us_) lost_since_us_ = utime_us;
   if (utime_us - *lost_since_us_ <= options_.max_lost_us || !options_.makes_keyframes) return false;
   if (last_) {
-    part_from_world_ = last_->frame.world_from_camera;
+    world_from_start_ = last_->frame.world_from_camera;
     last_.reset();
     initializer_ = MonoInitializer(options_.start);
   }
@@ -287,7 +269,7 @@ bool MapTracker::IsKeyframeDue() {
     if (!point || point->z() > near_m) continue;
     (frame.points[Index(i)].valid() ? near.num_known : near.num_new) += 1;
   }
-  const Rigid3 world_from_reference = replica_.PlaceOf(reference_).value_or(Sim3{}).Pose();
+  const Rigid3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Pose();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
   const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near);
   return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;
@@ -307,16 +289,16 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
     const SeenPoint& point = frame.points[i];
     keyframe.landmarks[i] = point.id.landmark;
     if (point.id.keyframe.valid()) {
-      const Sim3 other_from_world = replica_.PlaceOf(point.id.keyframe).value_or(Sim3{}).Inverse();
+      const Sim3 other_from_world = replica_.WorldFromKeyframe(point.id.keyframe).value_or(Sim3{}).Inverse();
       keyframe.shared.push_back({static_cast<int32_t>(i), point.id.keyframe, point.id.keypoint,
                                  other_from_world * point.landmark.position_in_world});
     }
   }
   SentKeyframe sent{reference, reference_from_camera, {}};
-  // Points that one view alone placed are no measure of what should be seen again, unless there are no others.
+  // Points that one view alone knows are no measure of what should be seen again, unless there are no others.
   const bool has_known_points = frame.NumPoints() > 0;
   if (has_known_points) decision_.Restart(frame);
-  PlaceDepthPoints(frame, keyframe.id, sent);
+  AddDepthPoints(frame, keyframe.id, sent);
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
@@ -326,15 +308,15 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
 }
 
 // Until the mapper answers, near keypoints with depth are points of their own.
-void MapTracker::PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const {
+void MapTracker::AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const {
   const double max_depth_m = options_.max_depth_baselines * frame.view->baseline_m();
   for (int i = 0; i < frame.view->size(); ++i) {
     if (frame.points[Index(i)].valid()) continue;
     const auto point = PointFromDepth(frame.view->features(), i);
     if (!point || point->z() > max_depth_m) continue;
-    const Landmark placed = PointOf(*frame.view, i, *point);
-    sent.points[i] = placed;
-    frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), placed)};
+    const Landmark in_camera = PointOf(*frame.view, i, *point);
+    sent.points[i] = in_camera;
+    frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), in_camera)};
   }
 }
 

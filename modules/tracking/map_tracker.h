@@ -1,9 +1,9 @@
 // The tracker's step: one frame's features in, its pose and perhaps a keyframe out, in a map that the mapper owns and
 // that changes here by deltas. No bus, no clock.
 //
-// Points are matched around a constant-velocity prediction with the last frame's, then with the landmarks of the
-// keyframes around; after each, the pose is the one that explains the matches best. Between a keyframe and the delta
-// that answers it, the points that the tracker placed itself help out: mono's first ones, and near ones with depth.
+// The last frame's points are matched around a constant-velocity prediction, then the landmarks of the local keyframes;
+// after each, the pose is optimized over the matches. Between a keyframe and the delta that answers it, the points that
+// the tracker triangulated itself are used: mono's first ones, and near ones with depth.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ struct MapTrackerOptions {
   int min_start_points = 150;         // stereo, RGB-D: keypoints with depth that a first keyframe needs
   int min_last_matches = 20;          // fewer from the last frame: look in wider windows
   int min_inliers = 25;               // points that a pose must agree with
-  int min_relocalised_inliers = 50;   // likewise after a loss, where chance has more room
+  int min_relocalized_inliers = 50;   // likewise after a loss, where chance has more room
   int max_local_keyframes = 30;       // whose landmarks are looked for
   int64_t max_lost_us = 1500000;      // after so long without a pose, a new part of the map begins
   bool makes_keyframes = true;        // false: the map is used as it is, and no part is begun
@@ -44,7 +44,7 @@ struct MapTrackerOptions {
 
 struct MapTrackingResult {
   PoseEstimate pose;
-  // Nothing was decided yet: the frame can't be placed from what is around the last one. To be tracked again, with an
+  // Nothing is decided yet: the frame can't be localized from what is around the last one. To be tracked again, with an
   // answer or without.
   bool asks_relocalization = false;
   std::vector<KeyframeObservation> keyframes;  // made of this frame: none or one; or the two that mono starts from
@@ -70,27 +70,36 @@ class MapTracker {
  private:
   using Frame = std::shared_ptr<const FrameView>;
 
+  //   kInitializing -> kTracking           the first frame with depth, or pair of frames, starts the map
+  //   kTracking -> kLost                   a frame can't be localized
+  //   kLost -> kTracking                   one can, or a new part of the map starts after max_lost_us
+  enum class State { kInitializing, kTracking, kLost };
+  State state() const;
+  bool has_map() const { return replica_.map().keyframes().size() > 0; }
+
   // What is remembered of the last tracked frame.
   struct Last {
     TrackedFrame frame;
     Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
   };
 
+  MapTrackingResult UndecidedResult(const FrameView& view) const;
+  void DescribePose(MapTrackingResult& result);
   bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
-  void RenewLast();
-  bool Place(TrackedFrame& frame) const;
+  void UpdateLast();
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
+  bool CanAskFor(const FrameView& view) const;
+  bool Localize(const Frame& view);
   bool FollowLast(TrackedFrame& frame) const;
-  bool Relocalise(TrackedFrame& frame) const;
-  std::vector<KeyframeId> LocalKeyframes(const TrackedFrame& frame) const;
-  PlacedPoints LocalPoints(const TrackedFrame& frame) const;
+  bool Relocalize(TrackedFrame& frame) const;
+  KnownPoints PointsAround(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
-  void PlaceDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
+  void AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
 
   const MapTrackerOptions options_;
   MapReplica replica_;
@@ -100,7 +109,7 @@ class MapTracker {
   std::optional<Rigid3> current_from_last_;  // velocity: motion over the last frame interval, in the reference's units
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
-  Rigid3 part_from_world_;         // world_from_camera where the next part begins
+  Rigid3 world_from_start_;        // camera where the next part of the map begins
   int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last

@@ -171,7 +171,7 @@ struct Layout<removed_keyframes_t> {
   static void Describe(Fields& fields, Message& message, Value& removed) {
     fields.Key(message.delta, removed.delta);
     fields.Check(removed.delta >= 0, "its delta's number is negative");
-    fields.List(message.num_ties, message.ties, removed.ties);
+    fields.List(message.num_ties, message.ties, removed.links);
   }
 };
 TESSERA_CODEC(RemovedInDelta, removed_keyframes_t);

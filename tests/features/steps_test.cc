@@ -46,13 +46,13 @@ GrayImage ReduceSlowly(const GrayImage& below) {
 int ScoreSlowly(const GrayImage& image, int x, int y) {
   constexpr int kRing[16][2] = {{0, 3},  {1, 3},   {2, 2},   {3, 1},   {3, 0},  {3, -1}, {2, -2}, {1, -3},
                                 {0, -3}, {-1, -3}, {-2, -2}, {-3, -1}, {-3, 0}, {-3, 1}, {-2, 2}, {-1, 3}};
-  const int centre = image.row(y)[x];
+  const int center = image.row(y)[x];
   const auto is_corner = [&](int threshold) {
     for (int sign : {1, -1}) {
       int run = 0;
       for (int i = 0; i < 16 + 8; ++i) {
         const int value = image.row(y + kRing[i % 16][1])[x + kRing[i % 16][0]];
-        run = sign * (value - centre) > threshold ? run + 1 : 0;
+        run = sign * (value - center) > threshold ? run + 1 : 0;
         if (run == 9) return true;
       }
     }
@@ -65,7 +65,7 @@ int ScoreSlowly(const GrayImage& image, int x, int y) {
 
 // Averages of three pixels that are `step` apart, along y, then along x; every average of two is rounded up.
 GrayImage SmoothSlowly(const GrayImage& image, int step) {
-  const auto smooth3 = [](int before, int centre, int after) { return ((before + after + 1) / 2 + centre + 1) / 2; };
+  const auto smooth3 = [](int before, int center, int after) { return ((before + after + 1) / 2 + center + 1) / 2; };
   GrayImage along_y(image.width, image.height);
   for (int y = step; y < image.height - step; ++y) {
     for (int x = 0; x < image.width; ++x) {
@@ -205,7 +205,7 @@ std::vector<Candidate> DetectSlowly(const GrayImage& image, int min_score, int c
 }
 
 TEST(CornerDetector, FindsTheCornersOfTheDefinition) {
-  GrayImage coarse = MakeNoise(150, 120, 5);  // few grey values: many ties
+  GrayImage coarse = MakeNoise(150, 120, 5);  // few gray values: many ties
   for (uint8_t& pixel : coarse.pixels) pixel = static_cast<uint8_t>(pixel / 64 * 64);
   for (const GrayImage& image : {MakeNoise(155, 131, 5), MakeTexture(203, 97, 6), coarse}) {
     const CameraCalibration calibration = MakeCalibration(SensorType::kMono, image.width, image.height);

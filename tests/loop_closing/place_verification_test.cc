@@ -34,7 +34,7 @@ class PlaceCoverage : public testing::Test {
 
   SyntheticWorld world_{SensorType::kStereo};
   PlantedMap planted_{world_};
-  PlacedPoints points_;
+  KnownPoints points_;
   std::unique_ptr<TrackedFrame> frame_;
 };
 
@@ -74,7 +74,7 @@ TEST(LandmarksAround, AreThoseOfTheKeyframeAndItsNeighborsOnceEach) {
   SyntheticWorld world(SensorType::kStereo);
   PlantedMap planted(world);
   for (int64_t k = 0; k < 4; ++k) planted.Add(k, {k - 1});
-  const PlacedPoints own = LandmarksAround(planted.map(), {0}, 0), all = LandmarksAround(planted.map(), {0}, 3);
+  const KnownPoints own = LandmarksAround(planted.map(), {0}, 0), all = LandmarksAround(planted.map(), {0}, 3);
   EXPECT_EQ(own.size(), planted.map().FindKeyframe({0})->landmarks.size());
   EXPECT_EQ(all.size(), static_cast<size_t>(planted.map().landmarks().size()));
   EXPECT_TRUE(std::is_sorted(all.begin(), all.end(),

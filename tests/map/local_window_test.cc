@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-// A corridor: keyframe k sees the landmarks 10 k .. 10 k + 39, so neighbours share 30, 20 and 10 of them.
+// A corridor: keyframe k sees the landmarks 10 k .. 10 k + 39, so neighbors share 30, 20 and 10 of them.
 Map Corridor(int num_keyframes) {
   Map map;
   MapEditor editor(map);
@@ -24,7 +24,7 @@ Map Corridor(int num_keyframes) {
   return map;
 }
 
-TEST(LocalWindow, HoldsNeighboursWhatTheySeeAndWhoElseSeesIt) {
+TEST(LocalWindow, HoldsNeighborsWhatTheySeeAndWhoElseSeesIt) {
   const Map map = Corridor(12);
   const LocalWindow window =
       SelectLocalWindow(map, {6}, {.max_inner_keyframes = 5, .min_shared_landmarks = 15, .max_outer_keyframes = 4});
@@ -44,7 +44,7 @@ TEST(LocalWindow, LeavesOutLandmarksThatOneKeyframeSees) {
   EXPECT_EQ(window.landmarks.back(), LandmarkId{39});
 }
 
-TEST(LocalWindow, NeighboursNeedEnoughInCommon) {
+TEST(LocalWindow, NeighborsNeedEnoughInCommon) {
   const Map map = Corridor(6);
   const LocalWindow window = SelectLocalWindow(map, {0}, {.min_shared_landmarks = 25});
   EXPECT_EQ(window.inner, (std::vector<KeyframeId>{{0}, {1}}));

@@ -41,7 +41,7 @@ MapDelta RandomStep(Map& map, std::mt19937& generator) {
   for (int i = 0; i < 60; ++i) {
     const LandmarkId any{static_cast<int64_t>(generator()) % (map.landmarks().end_id() + 1)};
     const LandmarkId other{static_cast<int64_t>(generator()) % (map.landmarks().end_id() + 1)};
-    const KeyframeId seer{static_cast<int64_t>(generator()) % map.keyframes().end_id()};
+    const KeyframeId observer{static_cast<int64_t>(generator()) % map.keyframes().end_id()};
     switch (generator() % 8) {
       case 0:
       case 1:
@@ -49,9 +49,9 @@ MapDelta RandomStep(Map& map, std::mt19937& generator) {
         break;
       case 2:
       case 3:
-        if (map.landmarks().Has(any) && map.keyframes().Has(seer) && !Sees(map, seer, any) &&
-            FreeKeypoint(map, seer) >= 0) {
-          editor.AddObservation(any, {seer, FreeKeypoint(map, seer)});
+        if (map.landmarks().Has(any) && map.keyframes().Has(observer) && !Sees(map, observer, any) &&
+            FreeKeypoint(map, observer) >= 0) {
+          editor.AddObservation(any, {observer, FreeKeypoint(map, observer)});
         }
         break;
       case 4:
@@ -64,12 +64,12 @@ MapDelta RandomStep(Map& map, std::mt19937& generator) {
         if (map.landmarks().Has(any) && generator() % 3 == 0) editor.RemoveLandmark(any);
         break;
       default:
-        if (map.keyframes().Has(seer)) {
-          if (generator() % 6 == 0 && seer != keyframe) {
-            editor.RemoveKeyframe(seer);
+        if (map.keyframes().Has(observer)) {
+          if (generator() % 6 == 0 && observer != keyframe) {
+            editor.RemoveKeyframe(observer);
           } else {
-            editor.MoveKeyframe(seer, {Eigen::Quaterniond::Identity(), {1.0 * i, 0, 0}});
-            editor.SetParent(seer, keyframe);
+            editor.MoveKeyframe(observer, {Eigen::Quaterniond::Identity(), {1.0 * i, 0, 0}});
+            editor.SetParent(observer, keyframe);
           }
         }
     }

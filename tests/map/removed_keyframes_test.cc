@@ -11,9 +11,9 @@
 namespace tessera {
 namespace {
 
-const Sim3 kBend{1.7, ExpSO3({0.3, -0.2, 0.9}), {4.0, -1.0, 2.0}};  // new_world_from_old_world
+const Sim3 kCorrection{1.7, ExpSO3({0.3, -0.2, 0.9}), {4.0, -1.0, 2.0}};  // new_world_from_old_world
 
-Sim3 PlaceOf(int64_t id, double scale) {
+Sim3 WorldFromKeyframe(int64_t id, double scale) {
   const auto step = static_cast<double>(id);
   return Sim3::From({ExpSO3({0.1 * step, 0.05, -0.2 * step}), {step, 0.3 * step, 0.1}}, scale);
 }
@@ -23,7 +23,8 @@ Map Chain() {
   Map map;
   MapEditor editor(map);
   for (int64_t id = 0; id < 4; ++id) {
-    editor.AddKeyframe({id}, {id - 1}, PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)), PlainFeatures(id, 1));
+    editor.AddKeyframe({id}, {id - 1}, WorldFromKeyframe(id, 1.0 + 0.25 * static_cast<double>(id)),
+                       PlainFeatures(id, 1));
   }
   (void)editor.Finish({3});
   return map;
@@ -51,7 +52,7 @@ MapDelta Remove(Map& map, const std::vector<KeyframeId>& ids, RemovedKeyframes& 
   return delta;
 }
 
-void Bend(Map& map, const Sim3& new_from_old) {
+void Correct(Map& map, const Sim3& new_from_old) {
   MapEditor editor(map);
   map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
     editor.MoveKeyframe(id, new_from_old * keyframe.WorldFromKeyframe());
@@ -66,7 +67,7 @@ TEST(RemovedKeyframes, StandWhereTheyStoodWhileTheMapRests) {
   Remove(map, {{1}}, removed);
   for (int64_t id = 0; id < 4; ++id) {
     ASSERT_TRUE(removed.Find(map, {id}).has_value());
-    ExpectNear(*removed.Find(map, {id}), PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)));
+    ExpectNear(*removed.Find(map, {id}), WorldFromKeyframe(id, 1.0 + 0.25 * static_cast<double>(id)));
   }
   EXPECT_EQ(removed.Successor(map, {2}), KeyframeId{0});
   EXPECT_EQ(removed.Successor(map, {3}), KeyframeId{3});
@@ -84,9 +85,9 @@ TEST(RemovedKeyframes, GoAlongWhenTheMapIsBent) {
       Remove(map, {{1}}, removed);
       Remove(map, {{2}}, removed);
     }
-    Bend(map, kBend);
+    Correct(map, kCorrection);
     for (int64_t id = 1; id < 3; ++id) {
-      ExpectNear(*removed.Find(map, {id}), kBend * PlaceOf(id, 1.0 + 0.25 * static_cast<double>(id)));
+      ExpectNear(*removed.Find(map, {id}), kCorrection * WorldFromKeyframe(id, 1.0 + 0.25 * static_cast<double>(id)));
     }
   }
 }
@@ -96,17 +97,17 @@ TEST(RemovedKeyframes, OneThatCameLateIsToldTheSame) {
   for (const bool at_once : {false, true}) {
     Map map = Chain();
     RemovedKeyframes followed, told;
-    KeyframePlaces places;
-    places.Begin(map);
+    KeyframePoses poses;
+    poses.Begin(map);
     std::vector<std::vector<KeyframeId>> steps{{{2}}, {{1}}};
     if (at_once) steps = {{{1}, {2}}};
     for (const auto& ids : steps) {
-      for (const KeyframeTie& tie : places.Update(Remove(map, ids, followed), map).ties) told.Add(tie);
+      for (const KeyframeLink& link : poses.Update(Remove(map, ids, followed), map).links) told.Add(link);
       MapEditor editor(map);
       map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-        editor.MoveKeyframe(id, kBend * keyframe.WorldFromKeyframe());
+        editor.MoveKeyframe(id, kCorrection * keyframe.WorldFromKeyframe());
       });
-      EXPECT_TRUE(places.Update(editor.Finish({9}), map).ties.empty());
+      EXPECT_TRUE(poses.Update(editor.Finish({9}), map).links.empty());
     }
     for (int64_t id = 0; id < 4; ++id) {
       const Sim3 a = *followed.Find(map, {id}), b = *told.Find(map, {id});
@@ -127,7 +128,7 @@ TEST(RemovedKeyframes, TiesInACircleAreIgnored) {
 }
 
 // A frame's pose is stored relative to a keyframe, in its units of that time. What it saw then, it sees at the same
-// pixels after any bending, at a distance that grew with the place.
+// pixels after any correction, at a distance that grows with the map.
 TEST(RemovedKeyframes, APoseKeepsItsPlaceInItsSurroundings) {
   Map map = Chain();
   RemovedKeyframes removed;
@@ -136,14 +137,14 @@ TEST(RemovedKeyframes, APoseKeepsItsPlaceInItsSurroundings) {
   for (const int64_t reference : {1, 3}) {
     const Rigid3 before = (*removed.Find(map, {reference}) * reference_from_camera).Pose();
     const Eigen::Vector3d seen_before = before.Inverse() * landmark;
-    Map bent = map;
-    RemovedKeyframes ties = removed;
-    if (reference == 1) Remove(bent, {{1}}, ties);
-    Bend(bent, kBend);
-    Bend(bent, kBend);
-    const Rigid3 after = (*ties.Find(bent, {reference}) * reference_from_camera).Pose();
-    const Eigen::Vector3d seen_after = after.Inverse() * (kBend * (kBend * landmark));
-    EXPECT_LT((seen_after - kBend.scale * kBend.scale * seen_before).norm(), 1e-9) << reference;
+    Map corrected = map;
+    RemovedKeyframes links = removed;
+    if (reference == 1) Remove(corrected, {{1}}, links);
+    Correct(corrected, kCorrection);
+    Correct(corrected, kCorrection);
+    const Rigid3 after = (*links.Find(corrected, {reference}) * reference_from_camera).Pose();
+    const Eigen::Vector3d seen_after = after.Inverse() * (kCorrection * (kCorrection * landmark));
+    EXPECT_LT((seen_after - kCorrection.scale * kCorrection.scale * seen_before).norm(), 1e-9) << reference;
   }
 }
 

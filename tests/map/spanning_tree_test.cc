@@ -45,7 +45,7 @@ TEST(SpanningTree, RootsNameTheParts) {
 TEST(SpanningTree, HangingATreeBelowAnotherTurnsItsPathRound) {
   Map map = MapOf({-1, 0, -1, 2, 3, 4, 4, 2});
   MapEditor editor(map);
-  HangBelow({4}, {1}, editor);
+  AttachTree({4}, {1}, editor);
   (void)editor.Finish({8});
   const std::vector<int64_t> parents{-1, 0, 3, 4, 1, 4, 4, 2};
   for (size_t i = 0; i < parents.size(); ++i) {
@@ -65,7 +65,7 @@ TEST(SpanningTree, HangingKeepsEveryEdgeAndJoinsTheTwo) {
     const KeyframeId parent{2 * (static_cast<int64_t>(generator()) % 20)};
     edges.insert(std::minmax(hung, parent));
     MapEditor editor(map);
-    HangBelow(hung, parent, editor);
+    AttachTree(hung, parent, editor);
     EXPECT_THAT(replica.Apply(editor.Finish({40})), IsSuccess());
     EXPECT_EQ(EdgesOf(map), edges) << seed;
     EXPECT_EQ(map.FindKeyframe(hung)->parent, parent);

@@ -378,14 +378,15 @@ bool AreSameSimilarity(const Sim3& a, const Sim3& b) { return a.scale == b.scale
 
 template <>
 RemovedInDelta DrawValue<RemovedInDelta>(std::mt19937& generator, int size) {
-  RemovedInDelta removed{.delta = Draw(generator, 0, 999), .ties = {}};
-  const int num_ties = size == 0 ? 0 : 2000;
-  for (int i = 0; i < num_ties; ++i) removed.ties.push_back({{i}, {Draw(generator, 0, 99)}, DrawSimilarity(generator)});
+  RemovedInDelta removed{.delta = Draw(generator, 0, 999), .links = {}};
+  const int num_links = size == 0 ? 0 : 2000;
+  for (int i = 0; i < num_links; ++i)
+    removed.links.push_back({{i}, {Draw(generator, 0, 99)}, DrawSimilarity(generator)});
   return removed;
 }
 template <>
 bool AreSame(const RemovedInDelta& a, const RemovedInDelta& b) {
-  return a.delta == b.delta && AreSameLists(a.ties, b.ties, [](const auto& x, const auto& y) {
+  return a.delta == b.delta && AreSameLists(a.links, b.links, [](const auto& x, const auto& y) {
            return x.keyframe == y.keyframe && x.parent == y.parent &&
                   AreSameSimilarity(x.parent_from_keyframe, y.parent_from_keyframe);
          });

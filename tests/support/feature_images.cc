@@ -47,19 +47,19 @@ GrayImage MakeTexture(int width, int height, uint32_t seed) {
   const int num_shapes = width * height / 120;
   for (int i = 0; i < num_shapes; ++i) {
     const int size = 4 + below(8) * below(8);
-    const cv::Point centre(below(width), below(height));
-    const cv::Scalar grey(20 + below(216));
+    const cv::Point center(below(width), below(height));
+    const cv::Scalar gray(20 + below(216));
     if (below(3) == 0) {
-      cv::circle(mat, centre, size / 2, grey, cv::FILLED);
+      cv::circle(mat, center, size / 2, gray, cv::FILLED);
     } else {
       const auto angle = static_cast<float>(below(360));
-      const cv::RotatedRect box(centre, cv::Size2f(static_cast<float>(size), static_cast<float>(3 + below(size))),
+      const cv::RotatedRect box(center, cv::Size2f(static_cast<float>(size), static_cast<float>(3 + below(size))),
                                 angle);
       cv::Point2f corners[4];
       box.points(corners);
       cv::Point polygon[4];
       for (int k = 0; k < 4; ++k) polygon[k] = corners[k];
-      cv::fillConvexPoly(mat, polygon, 4, grey);
+      cv::fillConvexPoly(mat, polygon, 4, gray);
     }
   }
   cv::GaussianBlur(mat, mat, cv::Size(5, 5), 0.8);

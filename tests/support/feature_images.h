@@ -11,14 +11,14 @@
 
 namespace tessera {
 
-// Reads a file below TESSERA_DATA as grey; nullopt if it isn't there.
+// Reads a file below TESSERA_DATA as gray; nullopt if it isn't there.
 std::optional<GrayImage> ReadRealImage(const std::string& path);
 std::optional<GrayImage> ReadKittiImage(int frame);
 
 // Every pixel independent and uniform.
 GrayImage MakeNoise(int width, int height, uint32_t seed);
 GrayImage MakeFlat(int width, int height, uint8_t value);
-// Overlapping rectangles and discs of all sizes and grey values, slightly smoothed and noisy: corners at every scale.
+// Overlapping rectangles and discs of all sizes and gray values, slightly smoothed and noisy: corners at every scale.
 GrayImage MakeTexture(int width, int height, uint32_t seed);
 
 // The texture as a second camera sees it whose disparity falls from `near_px` at the bottom to `far_px` at the top, row

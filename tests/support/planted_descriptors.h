@@ -1,4 +1,4 @@
-// Descriptors around planted centres: what a good clustering of them is, is known.
+// Descriptors around planted centers: what a good clustering of them is, is known.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-// Random bright and dark rectangles on a mid-grey ground, repeatable by seed.
+// Random bright and dark rectangles on a mid-gray ground, repeatable by seed.
 inline GrayImage RectanglesImage(int width, int height, unsigned seed) {
   GrayImage image(width, height, 100);
   std::mt19937 generator(seed);

@@ -107,7 +107,7 @@ inline SyntheticBundle MakeSyntheticBundle(const SyntheticBundleOptions& options
 struct SyntheticCircuitOptions {
   int num_keyframes = 300;
   double step_m = 1.0;                // from keyframe to keyframe
-  int num_neighbors = 3;             // keyframes before, that each has an edge to
+  int num_neighbors = 3;              // keyframes before, that each has an edge to
   bool has_scale = true;              // else the odometry's scale does not drift
   double rotation_sigma_rad = 0.001;  // of odometry, a step
   double translation_sigma = 0.01;    // a step, as a part of it

@@ -19,16 +19,16 @@ cv::Mat View(const GrayImage& image) {
   return {image.height, image.width, CV_8U, const_cast<uint8_t*>(image.pixels.data())};
 }
 
-// Turn and scale about the image's centre, then shift and tilt.
+// Turn and scale about the image's center, then shift and tilt.
 Eigen::Matrix3d Motion(const GrayImage& image, double degrees, double scale, double shift_px, double tilt) {
   const double c = scale * std::cos(degrees * M_PI / 180.0);
   const double s = scale * std::sin(degrees * M_PI / 180.0);
-  Eigen::Matrix3d centre = Eigen::Matrix3d::Identity();
-  centre(0, 2) = -0.5 * image.width;
-  centre(1, 2) = -0.5 * image.height;
+  Eigen::Matrix3d center = Eigen::Matrix3d::Identity();
+  center(0, 2) = -0.5 * image.width;
+  center(1, 2) = -0.5 * image.height;
   Eigen::Matrix3d motion;
   motion << c, -s, shift_px, s, c, -0.7 * shift_px, tilt / image.width, -tilt / image.width, 1.0;
-  return centre.inverse() * motion * centre;
+  return center.inverse() * motion * center;
 }
 
 WarpedPair Warp(const std::string& name, const GrayImage& image, const Eigen::Matrix3d& second_from_first) {

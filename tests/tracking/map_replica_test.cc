@@ -1,4 +1,4 @@
-// What the tracker has sent keeps its place in its surroundings, however the mapper bends the map.
+// Keyframes that the tracker has sent follow the corrections of the map around them.
 #include "tracking/map_replica.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-const Sim3 kBend{1.8, ExpSO3({0.2, -0.5, 0.1}), {3.0, 0.0, -2.0}};
+const Sim3 kCorrection{1.8, ExpSO3({0.2, -0.5, 0.1}), {3.0, 0.0, -2.0}};
 const Rigid3 kStep{ExpSO3({0.0, 0.1, 0.0}), {0.1, 0.0, 1.0}};
 
 // The owner's map of keyframes 0 and 1, of which 1 has been enlarged before.
@@ -30,10 +30,10 @@ class Owner {
     edit(editor);
     return editor.Finish(answers);
   }
-  MapDelta Bend() {
+  MapDelta Correct() {
     return Edit([&](MapEditor& editor) {
       map_.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-        editor.MoveKeyframe(id, kBend * keyframe.WorldFromKeyframe());
+        editor.MoveKeyframe(id, kCorrection * keyframe.WorldFromKeyframe());
       });
     });
   }
@@ -55,61 +55,61 @@ void ExpectNear(const Sim3& a, const Sim3& b) {
   EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);
 }
 
-TEST(MapReplica, WhatIsOnItsWayHasTheUnitsOfItsReference) {
+TEST(MapReplica, AnUnansweredKeyframeHasTheUnitsOfItsReference) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
   replica.Send({3}, {{2}, kStep, {}});
   const Sim3 second = Sim3::From(kStep, 1.25) * kStep;
-  ExpectNear(replica.PlaceOf({2}).value(), second);
-  ExpectNear(replica.PlaceOf({3}).value(), second * kStep);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), second);
+  ExpectNear(replica.WorldFromKeyframe({3}).value(), second * kStep);
   const Landmark point = replica.Find({{}, {2}, 0}).value();
   EXPECT_LT((point.position_in_world - second * Eigen::Vector3d(0.5, 0.0, 4.0)).norm(), 1e-12);
   EXPECT_NEAR(point.max_distance, 1.25 * 8.0, 1e-12);
-  EXPECT_FALSE(replica.PlaceOf({4}).has_value());
+  EXPECT_FALSE(replica.WorldFromKeyframe({4}).has_value());
   EXPECT_FALSE(replica.Find({{}, {2}, 1}).has_value());
 }
 
-TEST(MapReplica, BendingTakesAlongWhatIsOnItsWay) {
+TEST(MapReplica, ACorrectionMovesUnansweredKeyframesToo) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
-  const Sim3 place = replica.PlaceOf({2}).value();
+  const Sim3 world_from_sent = replica.WorldFromKeyframe({2}).value();
   const Landmark before = replica.Find({{}, {2}, 0}).value();
-  ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
-  ExpectNear(replica.PlaceOf({2}).value(), kBend * place);
+  ASSERT_THAT(replica.Apply(owner.Correct()), IsSuccess());
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), kCorrection * world_from_sent);
   const Landmark after = replica.Find({{}, {2}, 0}).value();
-  EXPECT_LT((after.position_in_world - kBend * before.position_in_world).norm(), 1e-9);
-  EXPECT_LT((after.normal - kBend.rotation * before.normal).norm(), 1e-12);
-  EXPECT_NEAR(after.min_distance, kBend.scale * before.min_distance, 1e-12);
+  EXPECT_LT((after.position_in_world - kCorrection * before.position_in_world).norm(), 1e-9);
+  EXPECT_LT((after.normal - kCorrection.rotation * before.normal).norm(), 1e-12);
+  EXPECT_NEAR(after.min_distance, kCorrection.scale * before.min_distance, 1e-12);
   ASSERT_EQ(replica.SentPoints().size(), 1U);
 }
 
-// The reference is culled in one delta, and the map is bent in the next.
-TEST(MapReplica, AReferenceThatIsCulledLeavesItsPlace) {
+// The reference is culled in one delta, and the map is corrected in the next.
+TEST(MapReplica, ACulledReferenceLeavesItsPose) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {}});
-  const Sim3 place = replica.PlaceOf({2}).value();
+  const Sim3 before = replica.WorldFromKeyframe({2}).value();
   ASSERT_THAT(replica.Apply(owner.Edit([](MapEditor& editor) { editor.RemoveKeyframe({1}); })), IsSuccess());
   EXPECT_EQ(replica.map().FindKeyframe({1}), nullptr);
-  ExpectNear(replica.PlaceOf({2}).value(), place);
-  ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
-  ExpectNear(replica.PlaceOf({1}).value(), kBend * Sim3::From(kStep, 1.25));
-  ExpectNear(replica.PlaceOf({2}).value(), kBend * place);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), before);
+  ASSERT_THAT(replica.Apply(owner.Correct()), IsSuccess());
+  ExpectNear(replica.WorldFromKeyframe({1}).value(), kCorrection * Sim3::From(kStep, 1.25));
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), kCorrection * before);
 }
 
-// The mapper puts the keyframe where the replica took it to be.
+// The mapper gives the keyframe the pose that the replica took for it.
 TEST(MapReplica, TheAnswerTakesOver) {
   Owner owner;
   MapReplica replica;
   ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
   replica.Send({2}, {{1}, kStep, {{0, PointAt({0.5, 0.0, 4.0})}}});
-  ASSERT_THAT(replica.Apply(owner.Bend()), IsSuccess());
-  const Sim3 place = replica.PlaceOf({2}).value();
+  ASSERT_THAT(replica.Apply(owner.Correct()), IsSuccess());
+  const Sim3 before = replica.WorldFromKeyframe({2}).value();
   const Landmark point = replica.Find({{}, {2}, 0}).value();
   LandmarkId name;
   const MapDelta answer = owner.Edit(
@@ -121,7 +121,7 @@ TEST(MapReplica, TheAnswerTakesOver) {
       {2});
   ASSERT_THAT(replica.Apply(answer), IsSuccess());
   EXPECT_TRUE(replica.sent().empty());
-  ExpectNear(replica.PlaceOf({2}).value(), place);
+  ExpectNear(replica.WorldFromKeyframe({2}).value(), before);
   EXPECT_EQ(replica.Renew({{}, {2}, 0}).landmark, name);
   EXPECT_FALSE(replica.Renew({{}, {2}, 1}).valid());
   EXPECT_TRUE(replica.SentPoints().empty());

@@ -188,7 +188,7 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.page = page.num_pages; });
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.part.removed_keyframes.push_back({1}); });
   ExpectRefused<MapRequest>([](MapRequest& request) { request.page = -1; });
-  ExpectRefused<RemovedInDelta>([](RemovedInDelta& removed) { removed.ties.push_back({{3}, {-1}, {}}); });
+  ExpectRefused<RemovedInDelta>([](RemovedInDelta& removed) { removed.links.push_back({{3}, {-1}, {}}); });
   ExpectRefused<RemovedInDelta>([](RemovedInDelta& removed) { removed.delta = -1; });
 }
 

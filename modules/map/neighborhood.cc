@@ -1,4 +1,4 @@
-#include "map/neighbourhood.h"
+#include "map/neighborhood.h"
 
 #include <algorithm>
 
