@@ -1,0 +1,93 @@
+#include "measurement/feature_grid.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <random>
+
+namespace tessera {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+constexpr int kWidth = 200, kHeight = 100;
+
+Keypoint At(float x_px, float y_px) { return {.x_px = x_px, .y_px = y_px}; }
+
+std::vector<int32_t> Window(const FeatureGrid& grid, const Eigen::Vector2d& center_px, double radius_px) {
+  std::vector<int32_t> found;
+  grid.VisitWindow(center_px, radius_px, [&](int32_t i) { found.push_back(i); });
+  return found;
+}
+
+std::vector<int32_t> Segment(const FeatureGrid& grid, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  std::vector<int32_t> found;
+  grid.VisitSegment(from, to, 2.0, [&](int32_t i) { found.push_back(i); });
+  return found;
+}
+
+TEST(FeatureGrid, AWindowHoldsWhatIsWithinTheRadiusInBothCoordinates) {
+  const FeatureGrid grid({At(50, 50), At(59, 41), At(60.5F, 50), At(50, 39)}, kWidth, kHeight);
+  EXPECT_THAT(Window(grid, {50, 50}, 10.0), testing::UnorderedElementsAre(0, 1));
+  EXPECT_THAT(Window(grid, {50, 50}, 10.5), testing::UnorderedElementsAre(0, 1, 2));
+}
+
+TEST(FeatureGrid, AWindowFindsWhatASearchOfAllKeypointsFinds) {
+  std::mt19937_64 generator(3);
+  std::uniform_real_distribution<float> x(-5.0F, kWidth + 5.0F), y(-5.0F, kHeight + 5.0F);
+  std::vector<Keypoint> keypoints;
+  for (int i = 0; i < 500; ++i) keypoints.push_back(At(x(generator), y(generator)));
+  const FeatureGrid grid(keypoints, kWidth, kHeight);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector2d center(x(generator), y(generator));
+    std::vector<int32_t> expected;
+    for (size_t k = 0; k < keypoints.size(); ++k) {
+      const bool is_near =
+          std::abs(keypoints[k].x_px - center.x()) <= 12.0 && std::abs(keypoints[k].y_px - center.y()) <= 12.0;
+      if (is_near) expected.push_back(static_cast<int32_t>(k));
+    }
+    EXPECT_THAT(Window(grid, center, 12.0), testing::UnorderedElementsAreArray(expected));
+  }
+}
+
+TEST(FeatureGrid, KeypointsOfACellAreMetInTheirOrder) {
+  const FeatureGrid grid({At(70, 5), At(3, 5), At(2, 4), At(4, 3)}, kWidth, kHeight);
+  EXPECT_THAT(Window(grid, {0, 0}, 100.0), ElementsAre(1, 2, 3, 0));
+}
+
+TEST(FeatureGrid, KeypointsOutsideTheImageBelongToTheNearestCell) {
+  const FeatureGrid grid({At(-3, -2), At(203, 104)}, kWidth, kHeight);
+  EXPECT_THAT(Window(grid, {0, 0}, 4.0), ElementsAre(0));
+  EXPECT_THAT(Window(grid, {200, 100}, 4.0), ElementsAre(1));
+}
+
+TEST(FeatureGrid, PositionsThatAreNotFiniteAreNeverMet) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+  const FeatureGrid grid({At(nan, 5), At(5, infinity), At(5, 5)}, kWidth, kHeight);
+  EXPECT_THAT(Window(grid, {100, 50}, 1e9), ElementsAre(2));
+  EXPECT_THAT(Window(grid, {0, 0}, std::numeric_limits<double>::infinity()), ElementsAre(2));
+}
+
+TEST(FeatureGrid, ASegmentMeetsAllKeypointsNearItAndNoneFarAway) {
+  std::vector<Keypoint> keypoints;
+  for (int i = 0; i <= 20; ++i) {
+    const auto along = static_cast<float>(i) / 20.0F;
+    keypoints.push_back(At(20.0F + 160.0F * along, 10.0F + 80.0F * along));
+  }
+  keypoints.push_back(At(20, 90));
+  const FeatureGrid grid(keypoints, kWidth, kHeight);
+  const std::vector<int32_t> found = Segment(grid, {20, 10}, {180, 90});
+  for (int32_t i = 0; i <= 20; ++i) EXPECT_THAT(found, Contains(i));
+  EXPECT_THAT(found, testing::Not(Contains(21)));
+  EXPECT_THAT(Segment(grid, {180, 90}, {20, 10}), testing::UnorderedElementsAreArray(found)) << "either way";
+}
+
+TEST(FeatureGrid, AnEmptyGridHoldsNothing) {
+  EXPECT_THAT(Window(FeatureGrid(), {0, 0}, 10.0), IsEmpty());
+  EXPECT_THAT(Window(FeatureGrid({}, kWidth, kHeight), {50, 50}, 1000.0), IsEmpty());
+}
+
+}  // namespace
+}  // namespace tessera
