@@ -34,7 +34,7 @@ class PartReader {
     if constexpr (HasLayout<Field>) {
       Layout<Field>::Describe(*this, field, member);
     } else if (begins_ && verdict_) {
-      verdict_ = ReadField(field, member);
+      if (Result<> read = ReadField(field, member); !read) verdict_ = std::move(read);
     }
   }
   template <class Field, class Member>
@@ -71,8 +71,11 @@ class PartReader {
   template <class Item, class Member>
   void List(int32_t num, const std::vector<Item>& items, std::vector<Member>& members) {
     Check(members.size() + static_cast<size_t>(num) <= kMaxItems, "one of its lists is longer than any would be");
+    if (!verdict_) return;
+    const size_t begin = members.size();
     const bool begins = std::exchange(begins_, true);
-    for (size_t i = 0; i < static_cast<size_t>(num) && verdict_; ++i) (*this)(items[i], members.emplace_back());
+    members.resize(begin + static_cast<size_t>(num));
+    for (size_t i = 0; i < static_cast<size_t>(num) && verdict_; ++i) (*this)(items[i], members[begin + i]);
     begins_ = begins;
   }
 

@@ -61,11 +61,10 @@ class PartWriter {
   void List(int32_t& num, std::vector<Item>& items, const std::vector<Member>& members) {
     items.clear();
     TakeWhile(members.size(), [&](size_t i) {
-      Item item{};
-      (*this)(item, members[i]);
-      if (!Fits(WireSize(item))) return false;
-      items.push_back(std::move(item));
-      return true;
+      (*this)(items.emplace_back(), members[i]);
+      const bool fits = Fits(WireSize(items.back()));
+      if (!fits) items.pop_back();
+      return fits;
     });
     num = static_cast<int32_t>(items.size());
   }
