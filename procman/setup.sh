@@ -97,27 +97,28 @@ install_packages() {
     -o DPkg::Lock::Timeout=300 "${missing[@]}"
 }
 
+# make_python_env FOLDER REQUIREMENTS PURPOSE: unless the environment is there already, at this path and of these packages.
 make_python_env() {
-  local stamp_file="$root/.venv/.tessera-stamp" place wanted have=""
+  local folder="$root/$1" requirements="$root/procman/$2" purpose="$3" place wanted have=""
+  local stamp_file="$folder/.tessera-stamp"
   place="$root $(readlink -f /usr/bin/python3)"
-  wanted="$place $(sha256sum <"$root/procman/requirements.txt")"
+  wanted="$place $(sha256sum <"$requirements")"
   [ ! -f "$stamp_file" ] || have="$(<"$stamp_file")"
   [ "$have" != "$wanted" ] || return 0
   case "$have" in
     "$place "*) ;;
     *)
       # A link leads to the environment of another checkout, which --clear would empty.
-      [ ! -L "$root/.venv" ] || rm "$root/.venv"
-      say "Making the Python environment .venv, which brings LCM 1.5.3"
-      log_step "The Python environment could not be made." /usr/bin/python3 -m venv --clear "$root/.venv"
+      [ ! -L "$folder" ] || rm "$folder"
+      say "Making the Python environment $1, $purpose"
+      log_step "The Python environment could not be made." /usr/bin/python3 -m venv --clear "$folder"
       ;;
   esac
-  say "Installing the Python packages of procman/requirements.txt into it"
+  say "Installing the Python packages of procman/$2 into it"
   log_step "pip could not install the Python packages: is this machine online?" \
-    "$root/.venv/bin/python" -m pip install --disable-pip-version-check --no-deps --only-binary=:all: \
-    -r "$root/procman/requirements.txt"
+    "$folder/bin/python" -m pip install --disable-pip-version-check --no-deps --only-binary=:all: -r "$requirements"
   # So that the first run does not wait for it.
-  log_step "The Python packages could not be compiled." "$root/.venv/bin/python" -m compileall -q "$root/procman/tessera_cli"
+  log_step "The Python packages could not be compiled." "$folder/bin/python" -m compileall -q "$root/procman/tessera_cli"
   printf '%s\n' "$wanted" >"$stamp_file"
 }
 
@@ -168,52 +169,71 @@ num_build_jobs() {
   echo $((cores < gigabytes ? cores : gigabytes))
 }
 
-build() {
-  # Brought whole by `tessera deploy --built`; a deploy of sources takes the mark away.
-  [ ! -f "$root/build/.prebuilt" ] || return 0
-  # Warnings are errors for continuous integration alone: the compiler of a user may warn of more than ours.
-  local stamp_file="$root/build/.tessera-stamp" wanted have="" status=0 warnings_are_errors="${TESSERA_WERROR:-OFF}"
-  wanted="$(<"$root/.venv/.tessera-stamp") $warnings_are_errors"
+# configure FOLDER OPTION...: makes CMake's build folder, unless it is there already and was made in the same way.
+configure() {
+  local folder="$root/$1" wanted have="" stamp_file="$root/$1/.tessera-stamp"
+  shift
+  wanted="$(<"$root/.venv/.tessera-stamp") $*"
   [ ! -f "$stamp_file" ] || have="$(<"$stamp_file")"
-  export CCACHE_SLOPPINESS=pch_defines,time_macros
-  if [ "$have" != "$wanted" ]; then
-    # A cache that was made at another path or against another Python can't be used again.
-    rm -rf "$root/build/CMakeCache.txt" "$root/build/CMakeFiles"
-    say "Configuring the build in build/"
-    log_step "CMake could not configure the build." cmake -S "$root" -B "$root/build" -G Ninja \
-      -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_COMPILE_WARNING_AS_ERROR="$warnings_are_errors"
-    printf '%s\n' "$wanted" >"$stamp_file"
-  fi
-  printf '\n== ninja\n' >>"$setup_log"
-  ninja -C "$root/build" -j "$(num_build_jobs)" 2>&1 </dev/null | follow_ninja || status=$?
+  [ "$have" != "$wanted" ] || return 0
+  # A cache that was made at another path or against another Python can't be used again.
+  rm -rf "$folder/CMakeCache.txt" "$folder/CMakeFiles"
+  say "Configuring the build in ${folder#"$root"/}/"
+  log_step "CMake could not configure the build." cmake -S "$root" -B "$folder" -G Ninja \
+    -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@"
+  printf '%s\n' "$wanted" >"$stamp_file"
+}
+
+# build_in FOLDER TARGET...
+build_in() {
+  local folder="$root/$1" status=0
+  shift
+  printf '\n== ninja %s\n' "$*" >>"$setup_log"
+  CCACHE_SLOPPINESS=pch_defines,time_macros ninja -C "$folder" -j "$(num_build_jobs)" "$@" 2>&1 </dev/null |
+    follow_ninja || status=$?
   if [ "$status" -ne 0 ]; then
     grep -E -A 12 'FAILED:|error:|ninja: error' "$setup_log" | tail -n 25 >&2
     fail "The build failed. The whole output is in $setup_log."
   fi
+}
+
+# build TARGET...: in build/, optimized. Warnings are errors for continuous integration alone: the compiler of a user may
+# warn of more than ours.
+build() {
+  # Brought whole by `tessera deploy --built` or `cmake --install`; a deploy of sources takes the mark away.
+  [ ! -f "$root/build/.prebuilt" ] || return 0
+  configure build -DCMAKE_BUILD_TYPE=Release -DCMAKE_COMPILE_WARNING_AS_ERROR="${TESSERA_WERROR:-OFF}"
+  build_in build "$@"
   touch "$root/build/.built"
 }
 
-# setup_steps ask|tell
-setup_steps() {
+# prepare ask|tell: everything but the build. Two commands at once must not build into each other: the lock is held until
+# the command calls `finish_setup`.
+prepare() {
   mkdir -p "$root/logs"
-  # Two commands at once must not build into each other.
   exec 9>"$root/logs/.setup.lock"
   flock -n 9 || { say "Waiting for another tessera command that is setting up"; flock 9; }
   : >"$setup_log"
   check_machine
   install_packages
-  make_python_env
+  make_python_env .venv requirements.txt "which brings LCM 1.5.3"
   raise_receive_buffer "$1"
-  build
-  exec 9>&-
 }
 
+finish_setup() { exec 9>&-; }
+
+# setup_machine TARGET...: tells what it looks at.
 setup_machine() {
   say "Looking at packages, Python environment, network buffer and build"
-  setup_steps ask
+  prepare ask
+  build "$@"
+  finish_setup
 }
 
-# For commands that only want to start: asks on the first time, and says nothing when there is nothing to do.
+# setup_quietly TARGET...: for commands that only want to start. Asks on the first time, and says nothing when there is
+# nothing to do.
 setup_quietly() {
-  if [ -f "$root/build/.tessera-stamp" ] || [ -f "$root/build/.prebuilt" ]; then setup_steps tell; else setup_steps ask; fi
+  if [ -f "$root/build/.tessera-stamp" ] || [ -f "$root/build/.prebuilt" ]; then prepare tell; else prepare ask; fi
+  build "$@"
+  finish_setup
 }

@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "core/errors.h"
+#include "core/project_file.h"
 #include "core/version.h"
 #include "runtime/stage.h"
 #include "runtime/stage_engine.h"
@@ -36,6 +37,7 @@ struct Arguments {
 // The arguments; an exit status if the process is to end at once.
 std::optional<int> ParseArguments(const std::string& description, int argc, char** argv, Arguments* arguments) {
   CLI::App app(description);
+  app.set_version_flag("--version", std::string("Tessera ") + kVersion);
   app.add_option("--settings", arguments->settings_path,
                  "YAML file with the settings that differ from config/default.yaml");
   app.add_option("--set", arguments->assignments, "one setting, section.key=value; may be repeated");
@@ -50,13 +52,15 @@ std::optional<int> ParseArguments(const std::string& description, int argc, char
   return std::nullopt;
 }
 
-// On a node without the sources the file given must hold all settings.
+// A program on its own, without config/default.yaml in a folder above, needs a file that holds all settings.
 Settings ReadSettings(const Arguments& arguments) {
-  const std::string defaults = TESSERA_SOURCE_DIR "/config/default.yaml";
+  const std::optional<std::filesystem::path> defaults = FindProjectFile("config/default.yaml");
   const bool has_file = !arguments.settings_path.empty();
-  const bool has_defaults = std::filesystem::exists(defaults);
-  Settings settings = Settings::LoadDefaults(has_defaults || !has_file ? defaults : arguments.settings_path);
-  if (has_file && has_defaults) settings.OverrideFromFile(arguments.settings_path);
+  if (!defaults && !has_file) {
+    throw InputError("no folder above this program holds config/default.yaml; give all settings by --settings FILE");
+  }
+  Settings settings = Settings::LoadDefaults(defaults ? defaults->string() : arguments.settings_path);
+  if (has_file && defaults) settings.OverrideFromFile(arguments.settings_path);
   for (const std::string& assignment : arguments.assignments) {
     settings.Override(assignment);
   }

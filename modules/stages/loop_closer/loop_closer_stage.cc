@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/errors.h"
+#include "core/project_file.h"
 #include "core/session_actions.h"
 
 namespace tessera {
@@ -25,8 +26,10 @@ LoopCloserSessionOptions OptionsFrom(const Settings& settings) {
 }
 
 std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
-  const auto path = settings.Get<std::string>("loop_closer.vocabulary");
-  return Vocabulary::Load(path.empty() ? TESSERA_VOCABULARY : path);
+  if (const auto path = settings.Get<std::string>("loop_closer.vocabulary"); !path.empty()) return Vocabulary::Load(path);
+  const auto shipped = FindProjectFile("config/vocabulary.tvoc");
+  if (!shipped) throw InputError("no folder above this program holds config/vocabulary.tvoc; set loop_closer.vocabulary");
+  return Vocabulary::Load(*shipped);
 }
 
 }  // namespace

@@ -1,0 +1,83 @@
+# The tests and checks of the sources: sourced by `tessera` after setup.sh.
+
+failed=()
+# check NAME COMMAND...: runs it and remembers NAME if it fails.
+check() {
+  local name="$1"
+  shift
+  say "$name"
+  "$@" || failed+=("$name")
+}
+
+# Ends with status 1 if a check failed.
+tell_failures() {
+  local list
+  [ ${#failed[@]} -gt 0 ] || return 0
+  printf -v list ', %s' "${failed[@]}"
+  fail "failed: ${list#, }; the output above says why."
+}
+
+# --- tests ----------------------------------------------------------------------------------------
+run_tests() {
+  setup_machine all
+  check "C++ tests" ctest --test-dir "$root/build" --output-on-failure -j "$(nproc)"
+  check "Python tests" run_pytest
+  tell_failures
+}
+
+run_pytest() (
+  cd "$root"
+  PYTHONPATH="$root/procman" .venv/bin/python -m pytest -p no:cacheprovider -rs tests
+)
+
+# run_sanitized LIST: the C++ tests in a build of their own, under these sanitizers of the compiler. Without the recorded
+# sequences: those runs are long, and the same code is tested on made ones.
+run_sanitized() {
+  local folder="build-sanitize-${1//,/-}"
+  prepare ask
+  configure "$folder" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DTESSERA_SANITIZE="$1" \
+    -DTESSERA_DATA="$root/$folder/no-data"
+  build_in "$folder" tessera_tests
+  finish_setup
+  export ASAN_OPTIONS=detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=second_deadlock_stack=1
+  check "C++ tests, sanitized: $1" ctest --test-dir "$root/$folder" --output-on-failure -j "$(nproc)"
+  tell_failures
+}
+
+# --- lint -----------------------------------------------------------------------------------------
+cpp_sources() { find "$root/modules" "$root/procman" "$root/tests" -name '*.cc' -o -name '*.h'; }
+
+run_lint() {
+  prepare ask
+  make_python_env .venv-lint requirements-lint.txt "with the tools of the lint"
+  # As users build it, but without precompiled headers, which are GCC's own; of it only the messages' code is built.
+  configure build-lint -DCMAKE_BUILD_TYPE=Release -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON
+  build_in build-lint tessera_lcmtypes_cpp
+  finish_setup
+  check "clang-format" run_clang_format
+  check "clang-tidy" run_clang_tidy
+  check "ruff" run_ruff
+  check "mypy" run_mypy
+  tell_failures
+  say "The lint found nothing."
+}
+
+run_clang_format() { cpp_sources | xargs "$root/.venv-lint/bin/clang-format" --dry-run -Werror; }
+
+# Output only where there is something to say; xargs ends with a status above 0 if one of the calls did.
+run_clang_tidy() {
+  sed -n 's/^  "file": "\(.*\)",*$/\1/p' "$root/build-lint/compile_commands.json" |
+    xargs -P "$(nproc)" -n 1 "$root/.venv-lint/bin/clang-tidy" -p "$root/build-lint" --quiet --warnings-as-errors='*' \
+      --extra-arg=-Wno-unknown-warning-option 2>&1 | grep -v 'warnings generated\|^Suppressed\|^Use -header-filter'
+  [ "${PIPESTATUS[1]}" -eq 0 ]
+}
+
+run_ruff() (
+  cd "$root"
+  .venv-lint/bin/ruff check --no-cache . && .venv-lint/bin/ruff format --no-cache --check .
+)
+
+run_mypy() (
+  cd "$root"
+  .venv-lint/bin/mypy --python-executable .venv/bin/python --cache-dir build-lint/mypy
+)
