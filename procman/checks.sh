@@ -66,7 +66,7 @@ run_clang_format() { cpp_sources | xargs "$root/.venv-lint/bin/clang-format" --d
 
 # Output only where there is something to say; xargs ends with a status above 0 if one of the calls did.
 run_clang_tidy() {
-  sed -n 's/^  "file": "\(.*\)",*$/\1/p' "$root/build-lint/compile_commands.json" |
+  sed -nE 's/^  "file": "(.*\/(modules|procman)\/.*\.cc)",?$/\1/p' "$root/build-lint/compile_commands.json" |
     xargs -P "$(nproc)" -n 1 "$root/.venv-lint/bin/clang-tidy" -p "$root/build-lint" --quiet --warnings-as-errors='*' \
       --extra-arg=-Wno-unknown-warning-option 2>&1 | grep -v 'warnings generated\|^Suppressed\|^Use -header-filter'
   [ "${PIPESTATUS[1]}" -eq 0 ]
