@@ -26,9 +26,11 @@ LoopCloserSessionOptions OptionsFrom(const Settings& settings) {
 }
 
 std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
-  if (const auto path = settings.Get<std::string>("loop_closer.vocabulary"); !path.empty()) return Vocabulary::Load(path);
+  if (const auto path = settings.Get<std::string>("loop_closer.vocabulary"); !path.empty())
+    return Vocabulary::Load(path);
   const auto shipped = FindProjectFile("config/vocabulary.tvoc");
-  if (!shipped) throw InputError("no folder above this program holds config/vocabulary.tvoc; set loop_closer.vocabulary");
+  if (!shipped)
+    throw InputError("no folder above this program holds config/vocabulary.tvoc; set loop_closer.vocabulary");
   return Vocabulary::Load(*shipped);
 }
 
