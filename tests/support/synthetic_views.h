@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "geometry/camera.h"
+#include "geometry/reprojection.h"
 #include "geometry/rigid3.h"
 #include "geometry/two_view.h"
 
@@ -18,6 +19,16 @@ inline CameraCalibration MakeCamera() {
   camera.cx_px = 620.0;
   camera.cy_px = 240.0;
   return camera;
+}
+
+inline constexpr double kViewBaseline = 0.5;  // meters
+
+// Where the camera shows a point, exactly.
+inline PixelObservation SeePoint(const Eigen::Vector3d& point_in_camera, bool has_right) {
+  const CameraCalibration camera = MakeCamera();
+  PixelObservation seen{camera.Project(point_in_camera), kNoColumn, 1.3};
+  if (has_right) seen.right_x_px = seen.pixel_px.x() - camera.fx_px * kViewBaseline / point_in_camera.z();
+  return seen;
 }
 
 enum class Scene { kGeneral, kPlane };
