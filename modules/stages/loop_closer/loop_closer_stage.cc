@@ -27,7 +27,8 @@ std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
   const std::string path = settings.Get<LoopCloserSettings>().vocabulary;
   if (!path.empty()) return Vocabulary::Load(path);
   const auto shipped = FindProjectFile("config/vocabulary.tvoc");
-  if (!shipped) throw InputError("no folder above this program holds config/vocabulary.tvoc; set loop_closer.vocabulary");
+  if (!shipped)
+    throw InputError("no folder above this program holds config/vocabulary.tvoc; set loop_closer.vocabulary");
   return Vocabulary::Load(*shipped);
 }
 
