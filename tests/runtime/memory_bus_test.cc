@@ -380,7 +380,7 @@ TEST(MemoryBus, SameRunTwiceIsTheSame) {
 TEST(StreamSettings, AreChecked) {
   for (const char* assignment :
        {"bus.max_message_bytes=100", "bus.max_message_bytes=70000", "stream.history_bytes=0", "stream.heartbeat_ms=0",
-        "stream.repair_ms=0", "bus.first_tile_port=65000", "bus.channel_prefix=a b"}) {
+        "stream.repair_ms=0", "bus.first_tile_port=65300", "bus.channel_prefix=a b"}) {
     Settings settings = Defaults();
     EXPECT_THROW(settings.Override(assignment), InputError) << assignment;
   }
