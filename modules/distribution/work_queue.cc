@@ -18,7 +18,8 @@ Result<> WorkQueueOptions::Check() const {
   if (max_frames_in_flight < 1) return Failed("at least one frame must be in flight");
   if (jobs_per_extractor < 1) return Failed("an extractor must get at least one job");
   if (coarse_levels_from < 1) return Failed("level 0 must be cut");
-  if (late_us <= 0 || silent_us <= 0) return Failed("times after which jobs are late and extractors dead must be positive");
+  if (late_us <= 0 || silent_us <= 0)
+    return Failed("times after which jobs are late and extractors dead must be positive");
   return features.Check();
 }
 
