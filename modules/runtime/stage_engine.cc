@@ -28,7 +28,7 @@ StageEngine::StageEngine(Setup setup)
       open_bus_(std::move(setup.open_bus)),
       log_(std::move(setup.log)),
       figures_(identity_),
-      neighbours_(identity_),
+      neighbors_(identity_),
       outgoing_(identity_, stream_settings_),
       incoming_(stream_settings_, *clock_, [this](const std::string& sentence) { ReportError(sentence); }),
       root_(setup.root != nullptr ? setup.root : this) {
@@ -60,7 +60,7 @@ std::vector<std::shared_ptr<Bus>> StageEngine::buses() const {
 
 int StageEngine::Advertise(const Channel& channel) {
   if (channel.publishers == Publishers::kOne) {
-    if (const auto conflict = neighbours_.ConflictOverChannel(channel.name, clock_->NowUs())) {
+    if (const auto conflict = neighbors_.ConflictOverChannel(channel.name, clock_->NowUs())) {
       throw std::runtime_error(*conflict);
     }
   }
@@ -178,13 +178,13 @@ void StageEngine::ListenToExtractors(const Heartbeat& heartbeat) {
 
 void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageInfo& info) {
   const int64_t now_us = clock_->NowUs();
-  neighbours_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat, now_us);
+  neighbors_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat, now_us);
   if (incoming_.hears_all()) ListenToExtractors(heartbeat);
   incoming_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat);
-  auto conflict = neighbours_.ConflictOverName(now_us);
+  auto conflict = neighbors_.ConflictOverName(now_us);
   for (const StreamHead& head : heartbeat.streams) {
     if (!conflict && outgoing_.IsExclusive(head.channel)) {
-      conflict = neighbours_.ConflictOverChannel(head.channel, now_us);
+      conflict = neighbors_.ConflictOverChannel(head.channel, now_us);
     }
   }
   if (conflict && !stopped_) Fail(*conflict, 1);

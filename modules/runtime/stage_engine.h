@@ -13,7 +13,7 @@
 #include "runtime/bus.h"
 #include "runtime/clock.h"
 #include "runtime/incoming_streams.h"
-#include "runtime/neighbours.h"
+#include "runtime/neighbors.h"
 #include "runtime/outgoing_streams.h"
 #include "runtime/stage.h"
 #include "runtime/stage_figures.h"
@@ -87,7 +87,7 @@ class StageEngine {
   std::function<void(bool is_error, const std::string& sentence)> log_;
   std::map<std::string, std::shared_ptr<Bus>> buses_;  // by URL
   StageFigures figures_;
-  Neighbours neighbours_;
+  Neighbors neighbors_;
   OutgoingStreams outgoing_;
   IncomingStreams incoming_;
   std::vector<Timer> timers_;

@@ -126,7 +126,7 @@ class LoopRun {
   bool has_ended_ = false;
 };
 
-// In the world of the first frame, wherever a frame belongs: without the loop, the second part would be ten metres off.
+// In the world of the first frame, wherever a frame belongs: without the loop, the second part would be ten meters off.
 void ExpectTruePlaces(const LoopRun& run, int64_t min_poses) {
   std::istringstream rows(run.folder().Read("trajectory.txt"));
   std::string comment;

@@ -2,5 +2,5 @@
 
 int main(int argc, char** argv) {
   return tessera::RunStage<tessera::LoopCloserStage>(
-      "loop_closer", "Recognises places seen before, and finds a lost camera again.", argc, argv);
+      "loop_closer", "Recognizes places seen before, and finds a lost camera again.", argc, argv);
 }

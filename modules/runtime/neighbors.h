@@ -12,9 +12,9 @@
 
 namespace tessera {
 
-class Neighbours {
+class Neighbors {
  public:
-  explicit Neighbours(const StageIdentity& own) : own_(own) {}
+  explicit Neighbors(const StageIdentity& own) : own_(own) {}
 
   void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat, int64_t now_us);
 
@@ -24,17 +24,17 @@ class Neighbours {
   std::optional<std::string> ConflictOverChannel(const std::string& channel, int64_t now_us) const;
 
  private:
-  struct Neighbour {
+  struct Neighbor {
     std::string name;
     std::string host;
     int32_t pid = 0;
     int64_t heard_us = 0;
     std::set<std::string> exclusive_channels;
   };
-  bool IsAliveAndOlder(int64_t epoch_us, const Neighbour& neighbour, int64_t now_us) const;
+  bool IsAliveAndOlder(int64_t epoch_us, const Neighbor& neighbor, int64_t now_us) const;
 
   const StageIdentity own_;
-  std::multimap<int64_t, Neighbour> neighbours_;  // by the time at which they started
+  std::multimap<int64_t, Neighbor> neighbors_;  // by the time at which they started
 };
 
 }  // namespace tessera
