@@ -15,7 +15,7 @@ std::string Describe(const std::string& name, const std::string& host, int32_t p
 }  // namespace
 
 void Neighbors::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat,
-                             int64_t now_us) {
+                            int64_t now_us) {
   if (epoch_us == own_.epoch_us && heartbeat.pid == own_.pid && heartbeat.host == own_.host) {
     return;
   }
