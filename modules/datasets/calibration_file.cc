@@ -16,8 +16,8 @@ namespace {
 // A map of the file, which complains with the file's path and the full name of the key.
 class Section {
  public:
-  Section(std::string path, std::string prefix, YAML::Node node, std::initializer_list<const char*> known_keys)
-      : path_(std::move(path)), prefix_(std::move(prefix)), node_(std::move(node)) {
+  Section(std::string path, std::string prefix, const YAML::Node& node, std::initializer_list<const char*> known_keys)
+      : path_(std::move(path)), prefix_(std::move(prefix)), node_(node) {
     if (!node_.IsMap()) {
       throw InputError("calibration file " + path_ +
                        " must hold `key: value` lines; config/cameras/example.yaml shows how");
