@@ -150,7 +150,7 @@ std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography) {
     return {};
   }
   // u is a direction that H keeps in length, besides v2: both span a plane through the origin that H maps rigidly.
-  const Eigen::Matrix3d v = svd.matrixV();
+  const Eigen::Matrix3d& v = svd.matrixV();
   const double a = std::sqrt(std::max(0.0, 1.0 - s3 * s3)), b = std::sqrt(std::max(0.0, s1 * s1 - 1.0));
   std::vector<Rigid3> motions;
   for (const double side : {1.0, -1.0}) {
