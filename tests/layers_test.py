@@ -1,4 +1,4 @@
-"""The layers of modules/: includes point down only, no stage knows another, only runtime sees LCM, only wire its types."""
+"""The layers of modules/: includes point down, no stage knows another, only runtime sees LCM, only wire its types."""
 
 import re
 from pathlib import Path
