@@ -8,9 +8,6 @@
 namespace tessera {
 namespace {
 
-// The drive cuts corners at crossings; no object is so near its line.
-constexpr double kDriveGapM = 2.2;
-
 // A position beside a street.
 struct Spot {
   Eigen::Vector2d on_middle;  // the street's middle line
@@ -34,7 +31,7 @@ class StreetBuilder {
       }
     }
     BuildSkyline();
-    SendCars();
+    if (plan_.has_traffic) SendCars();
   }
 
  private:
@@ -52,7 +49,7 @@ class StreetBuilder {
     for (int i = -2; i <= 2; ++i) {
       for (int k = -2; k <= 2; ++k) {
         const Eigen::Vector2d p = middle + 0.5 * i * half_along * along + 0.5 * k * half_out * RightOf(along);
-        if (world_.streets->DistanceToStreet(p) < gap_m || drive_.DistanceToStreet(p) < kDriveGapM) return false;
+        if (world_.streets->DistanceToStreet(p) < gap_m || drive_.DistanceToStreet(p) < plan_.gap_m) return false;
       }
     }
     const double radius = std::hypot(half_along, half_out);
@@ -158,16 +155,7 @@ class StreetBuilder {
     const double crown = random_.Uniform(2.5, 5.0);
     const double trunk = random_.Uniform(1.6, 3.0);
     const double thick = random_.Uniform(0.1, 0.25);
-    const int32_t bark = builder_.AddPaint({Material::kBark, random_.Next(), 2.0 * thick, trunk + 0.5 * crown, 0.02});
-    builder_.Add(builder_.Box(foot, {1.0, 0.0}, thick, thick, 0.0, trunk + 0.5 * crown, bark, bark));
-    // Three planes through the trunk.
-    for (const Eigen::Vector2d& across :
-         {Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d(-0.5, 0.866), Eigen::Vector2d(-0.5, -0.866)}) {
-      const int32_t leaves = builder_.AddPaint({Material::kFoliage, random_.Next(), crown, crown, 0.04});
-      Surface surface = builder_.Wall(foot - 0.5 * crown * across, foot + 0.5 * crown * across, trunk, crown, leaves);
-      surface.two_sided = true;
-      builder_.Add(surface);
-    }
+    tessera::PlantTree(MakeTreeKind(crown, trunk, thick, random_, builder_), foot, 0.0, builder_);
   }
 
   void PutPole(const Eigen::Vector2d& foot, const Spot& spot) {
@@ -199,7 +187,8 @@ class StreetBuilder {
       const Spot spot = SpotAt(posts, i, side);
       const Eigen::Vector2d middle = spot.on_middle + random_.Uniform(4.6, 4.75) * spot.out;
       // Not across the mouth of another street.
-      if (world_.streets->DistanceToStreet(middle) < 4.5 || drive_.DistanceToStreet(middle) < 2.7) continue;
+      if (world_.streets->DistanceToStreet(middle) < 4.5 || drive_.DistanceToStreet(middle) < plan_.gap_m + 0.5)
+        continue;
       const uint32_t seed = random_.Next();
       const Eigen::Vector2d ahead = random_.Chance(0.9) ? spot.along : Eigen::Vector2d(-spot.along);
       builder_.Add(BuildCar(middle, ahead, seed, builder_));

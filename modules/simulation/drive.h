@@ -2,27 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <memory>
 #include <vector>
 
 #include "geometry/rigid3.h"
 #include "simulation/street_map.h"
+#include "simulation/terrain.h"
 
 namespace tessera {
-
-// A town and a drive through it.
-struct StreetPlan {
-  std::vector<Polyline> streets;  // middle lines, m
-  Polyline drive;                 // the car's way, m
-};
-
-// A walk over the crossings of a small town of bent streets, with several revisits in the same lane and in the other.
-// Only the first `length_m` of the drive are driven; 0: all of it.
-StreetPlan PlanTown(uint32_t seed, double length_m);
-// One round of blocks that overlaps its beginning by some 40 m.
-StreetPlan PlanRound(uint32_t seed, double length_m);
-// A drive along the true trajectory of a KITTI sequence (rows of 3x4 matrices); heights are ignored. Throws InputError.
-StreetPlan PlanFromPoses(const std::string& path, double length_m);
 
 class Trajectory {
  public:
@@ -31,11 +18,19 @@ class Trajectory {
   virtual Rigid3 WorldFromCamera(double time_s) const = 0;
 };
 
+// How someone drives.
+struct CarMotion {
+  double cruise_mps = 8.0;
+  double side_acceleration_mps2 = 2.2;  // at most, in bends
+  double acceleration_mps2 = 1.6;       // at most, along the way
+};
+
 // A car that slows down in bends, on a suspension that nods, rolls and heaves a little.
 class CarTrajectory : public Trajectory {
  public:
-  // `speed` times the usual 8 m/s.
-  CarTrajectory(const Polyline& drive, double speed, uint32_t seed);
+  // `speed` times the usual. The ground is `terrain`, or level without one.
+  CarTrajectory(const Polyline& drive, double speed, uint32_t seed, const CarMotion& motion = {},
+                std::shared_ptr<const Terrain> terrain = nullptr);
   double duration_s() const override;
   Rigid3 WorldFromCamera(double time_s) const override;
   // The car's position on the ground and its direction.
@@ -46,6 +41,21 @@ class CarTrajectory : public Trajectory {
   double DistanceAt(double time_s) const;
   Eigen::Vector2d PointAt(double distance_m) const;
 
+  Polyline points_;              // every kStepM
+  std::vector<double> times_s_;  // by point
+  uint32_t seed_;
+  std::shared_ptr<const Terrain> terrain_;
+};
+
+// A camera on someone who walks: it sways and bobs with the steps, and looks about.
+class WalkTrajectory : public Trajectory {
+ public:
+  // `speed` times the usual 2.1 m/s, which varies by a quarter.
+  WalkTrajectory(const Polyline& way, double speed, uint32_t seed);
+  double duration_s() const override { return times_s_.back(); }
+  Rigid3 WorldFromCamera(double time_s) const override;
+
+ private:
   Polyline points_;              // every kStepM
   std::vector<double> times_s_;  // by point
   uint32_t seed_;

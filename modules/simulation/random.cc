@@ -17,6 +17,11 @@ float CornerValue(uint32_t seed, int x, int y) {
 
 }  // namespace
 
+double Wave(double x) {
+  const double t = x - std::floor(x);
+  return t < 0.5 ? 16.0 * t * (0.5 - t) : -16.0 * (t - 0.5) * (1.0 - t);
+}
+
 double SmoothNoise(uint32_t seed, double x) {
   const double floor = std::floor(x);
   const auto cell = static_cast<uint32_t>(static_cast<int64_t>(floor));

@@ -42,6 +42,8 @@ class Random {
   uint32_t count_ = 0;
 };
 
+// A wave like a sine of period 1, of parabolas: exact arithmetic, the same on every machine.
+double Wave(double x);
 // Smooth noise in [-1, 1] over a line with about one extremum per unit; equal arguments give equal values.
 double SmoothNoise(uint32_t seed, double x);
 // Smooth noise in [0, 1] over the plane, one random value per unit square's corner.

@@ -57,11 +57,17 @@ class Drawer {
 };
 
 std::vector<Eigen::Vector2d> Drawer::Outline(const Surface& surface) const {
-  const std::array<Eigen::Vector3d, 4> points = surface.Corners();
+  const std::array<Eigen::Vector3d, 4> corners = surface.Corners();
+  // A triangle leaves out the corner opposite to it. Neighbors run along a common edge in the same direction, so that
+  // rounding leaves no gap.
+  std::array<size_t, 4> order{0, 1, 2, 3};
+  if (surface.part == SurfacePart::kLower) order = {0, 1, 3, 3};
+  if (surface.part == SurfacePart::kUpper) order = {3, 2, 1, 1};
+  const size_t num = surface.part == SurfacePart::kWhole ? 4 : 3;
   std::vector<Eigen::Vector2d> outline;
-  for (size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector3d& from = points[i];
-    const Eigen::Vector3d& to = points[(i + 1) % 4];
+  for (size_t i = 0; i < num; ++i) {
+    const Eigen::Vector3d& from = corners[order[i]];
+    const Eigen::Vector3d& to = corners[order[(i + 1) % num]];
     if (from.z() >= kNearM) outline.push_back(camera_.Project(from));
     if ((from.z() >= kNearM) != (to.z() >= kNearM)) {
       const double part = (kNearM - from.z()) / (to.z() - from.z());

@@ -27,6 +27,36 @@ Polyline Resample(const Polyline& line, double step_m) {
   return points;
 }
 
+Polyline Shift(const Polyline& line, double right_m) {
+  Polyline shifted;
+  for (size_t i = 0; i < line.size(); ++i) {
+    const Eigen::Vector2d along = line[std::min(i + 1, line.size() - 1)] - line[i > 0 ? i - 1 : 0];
+    shifted.push_back(line[i] + right_m * RightOf(along.normalized()));
+  }
+  return shifted;
+}
+
+Polyline Shorten(Polyline line, double length_m) {
+  if (length_m <= 0.0) return line;
+  double length = 0.0;
+  for (size_t i = 1; i < line.size(); ++i) {
+    length += (line[i] - line[i - 1]).norm();
+    if (length >= length_m) {
+      line.resize(i + 1);
+      break;
+    }
+  }
+  return line;
+}
+
+Eigen::Vector2d OnCircle(size_t quarter, double part) {
+  // A rational parametrization of each quarter: no trigonometry.
+  const double c = (1.0 - part * part) / (1.0 + part * part);
+  const double s = 2.0 * part / (1.0 + part * part);
+  const Eigen::Vector2d points[] = {{c, s}, {-s, c}, {-c, -s}, {s, -c}};
+  return points[quarter % 4];
+}
+
 StreetMap::StreetMap(const std::vector<Polyline>& streets) {
   Eigen::Vector2d low(1e9, 1e9);
   Eigen::Vector2d high(-1e9, -1e9);

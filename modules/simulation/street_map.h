@@ -17,6 +17,12 @@ using Polyline = std::vector<Eigen::Vector2d>;
 // Points every `step_m` along the polyline, its first one included.
 Polyline Resample(const Polyline& line, double step_m);
 double LengthOf(const Polyline& line);
+// The line shifted to its right.
+Polyline Shift(const Polyline& line, double right_m);
+// Its first `length_m`; 0: all of it.
+Polyline Shorten(Polyline line, double length_m);
+// A unit vector: `part` of the way around this quarter of the circle, 0 to 1, not quite evenly.
+Eigen::Vector2d OnCircle(size_t quarter, double part);
 // The unit vector to the right of direction `d` for someone on the ground (y down: x right when looking along z).
 inline Eigen::Vector2d RightOf(const Eigen::Vector2d& d) { return {d.y(), -d.x()}; }
 

@@ -9,13 +9,12 @@ namespace {
 
 Eigen::Vector3d OnGround(const Eigen::Vector2d& p, double height_m) { return {p.x(), -height_m, p.y()}; }
 
-// Sun from one side, sky from above.
+}  // namespace
+
 float BrightnessOf(const Eigen::Vector3d& normal) {
   const Eigen::Vector3d to_sun = Eigen::Vector3d(0.5, -0.7, -0.35).normalized();
   return static_cast<float>(0.68 + 0.34 * std::max(0.0, normal.dot(to_sun)));
 }
-
-}  // namespace
 
 int32_t WorldBuilder::AddPaint(const PaintSpec& spec) {
   world_.paints.push_back(spec);
@@ -58,6 +57,27 @@ Surface WorldBuilder::Lid(const Eigen::Vector2d& middle, const Eigen::Vector2d& 
 
 void WorldBuilder::Add(const std::vector<Surface>& surfaces) {
   world_.surfaces.insert(world_.surfaces.end(), surfaces.begin(), surfaces.end());
+}
+
+TreeKind MakeTreeKind(double crown_m, double trunk_m, double thick_m, Random& random, WorldBuilder& builder) {
+  const auto paint = [&](Material material, double width, double height, double texel) {
+    return builder.AddPaint({material, random.Next(), width, height, texel});
+  };
+  TreeKind kind{crown_m, trunk_m, thick_m, paint(Material::kBark, 2.0 * thick_m, trunk_m + 0.5 * crown_m, 0.02), {}};
+  for (int32_t& leaves : kind.leaves) leaves = paint(Material::kFoliage, crown_m, crown_m, 0.04);
+  return kind;
+}
+
+void PlantTree(const TreeKind& kind, const Eigen::Vector2d& foot, double ground_m, WorldBuilder& builder) {
+  const double height = kind.trunk_m + 0.5 * kind.crown_m;
+  builder.Add(builder.Box(foot, {1.0, 0.0}, kind.thick_m, kind.thick_m, ground_m, height, kind.bark, kind.bark));
+  const Eigen::Vector2d across[] = {{1.0, 0.0}, {-0.5, 0.866}, {-0.5, -0.866}};
+  for (size_t i = 0; i < kind.leaves.size(); ++i) {
+    const Eigen::Vector2d half = 0.5 * kind.crown_m * across[i];
+    Surface surface = builder.Wall(foot - half, foot + half, ground_m + kind.trunk_m, kind.crown_m, kind.leaves[i]);
+    surface.two_sided = true;
+    builder.Add(surface);
+  }
 }
 
 std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, uint32_t seed,

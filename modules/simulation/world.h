@@ -7,11 +7,15 @@
 #include <memory>
 #include <vector>
 
-#include "simulation/drive.h"
 #include "simulation/paint.h"
+#include "simulation/random.h"
 #include "simulation/street_map.h"
+#include "simulation/street_plan.h"
 
 namespace tessera {
+
+// The triangle of a surface that is drawn: all of it, a + b <= 1, or a + b >= 1. Hills are made of triangles.
+enum class SurfacePart { kWhole, kLower, kUpper };
 
 // The points corner + a * across + b * up with a, b in [0, 1]. The paint's bottom left is at the corner. Seen from the
 // side from which `across` points to the right and `up` up; from the other too if two_sided.
@@ -22,6 +26,7 @@ struct Surface {
   int32_t paint = 0;        // index into World::paints
   float brightness = 1.0F;  // of the light that falls on it
   bool two_sided = false;
+  SurfacePart part = SurfacePart::kWhole;
 
   Eigen::Vector3d Center() const { return corner + 0.5 * (across + up); }
   // In the order of its outline.
@@ -47,6 +52,9 @@ struct World {
   double sight_m = 260.0;                    // surfaces whose center is farther are not drawn, but `far` ones are
   std::vector<Surface> far;                  // sky and skyline
 };
+
+// The light on a surface with this unit normal: the sun from one side, the sky from above.
+float BrightnessOf(const Eigen::Vector3d& normal);
 
 // Adds surfaces and their paints to a world.
 class WorldBuilder {
@@ -75,6 +83,16 @@ class WorldBuilder {
 // The body of a parked or driving car in the middle of `middle`, facing `ahead`.
 std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, uint32_t seed,
                               WorldBuilder& builder);
+
+// What trees of one kind share: they look alike.
+struct TreeKind {
+  double crown_m, trunk_m, thick_m;  // width and height of the crown, free height of the trunk, half its thickness
+  int32_t bark;
+  std::array<int32_t, 3> leaves;  // paints of the crown's three planes
+};
+TreeKind MakeTreeKind(double crown_m, double trunk_m, double thick_m, Random& random, WorldBuilder& builder);
+// A trunk and three planes of leaves through it, standing on height `ground_m`.
+void PlantTree(const TreeKind& kind, const Eigen::Vector2d& foot, double ground_m, WorldBuilder& builder);
 
 // Houses, trees, parked and driving cars along the streets; the drive stays free.
 World BuildStreets(const StreetPlan& plan, uint32_t seed);

@@ -56,6 +56,22 @@ TEST(Renderer, ASurfaceIsSeenFromItsFrontUnlessItHasTwoSides) {
   EXPECT_NEAR(Draw(Walls({wall}), behind).inverse_depth.row(30)[40], 0.2F, 1e-4F);
 }
 
+TEST(Renderer, TheTwoTrianglesOfASurfaceTogetherAreTheSurface) {
+  Surface lower = WallAt(5.0, 0), upper = WallAt(5.0, 0);
+  lower.part = SurfacePart::kLower;
+  upper.part = SurfacePart::kUpper;
+  const Rendering half = Draw(Walls({lower})), both = Draw(Walls({lower, upper})),
+                  whole = Draw(Walls({WallAt(5.0, 0)}));
+  EXPECT_GT(half.inverse_depth.row(50)[10], 0.0F) << "the corner of the surface is at the bottom left";
+  EXPECT_EQ(half.inverse_depth.row(10)[70], 0.0F);
+  int num_different = 0;  // a span of pixels that begins elsewhere may choose another level of the paint
+  for (size_t i = 0; i < whole.radiance.pixels.size(); ++i) {
+    ASSERT_NEAR(both.inverse_depth.pixels[i], whole.inverse_depth.pixels[i], 1e-6F) << "no gap between them";
+    num_different += std::abs(both.radiance.pixels[i] - whole.radiance.pixels[i]) > 256 ? 1 : 0;
+  }
+  EXPECT_LT(num_different, static_cast<int>(whole.radiance.pixels.size() / 20)) << "the same paint at the same place";
+}
+
 TEST(Renderer, WhereNothingIsThereIsNoDepth) {
   for (const float inverse_depth : Draw(Walls({})).inverse_depth.pixels) ASSERT_EQ(inverse_depth, 0.0F);
   const Rendering behind = Draw(Walls({WallAt(-5.0, 0)}));

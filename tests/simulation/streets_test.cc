@@ -3,6 +3,7 @@
 
 #include "simulation/drive.h"
 #include "simulation/street_map.h"
+#include "simulation/street_plan.h"
 #include "support/matchers.h"
 
 namespace tessera {

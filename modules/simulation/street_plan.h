@@ -1,0 +1,32 @@
+// Streets of a town, and a way through them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "simulation/street_map.h"
+
+namespace tessera {
+
+// A town and a drive through it.
+struct StreetPlan {
+  std::vector<Polyline> streets;  // middle lines, m
+  Polyline drive;                 // the camera's way, m
+  double gap_m = 2.2;             // nothing stands nearer to the drive
+  bool has_traffic = true;        // cars come toward the camera
+};
+
+// A walk over the crossings of a small town of bent streets, with several revisits in the same lane and in the other.
+// Only the first `length_m` of the drive are driven; 0: all of it.
+StreetPlan PlanTown(uint32_t seed, double length_m);
+// One round of blocks that overlaps its beginning by some 40 m.
+StreetPlan PlanRound(uint32_t seed, double length_m);
+// A drive along the true trajectory of a KITTI sequence (rows of 3x4 matrices); heights are ignored. Throws InputError.
+StreetPlan PlanFromPoses(const std::string& path, double length_m);
+
+// A walk on pavements once around the block and the first two sides of it again. Every so often it leaves the pavement
+// and returns to it; it turns within 3 m.
+StreetPlan PlanStroll(uint32_t seed, double length_m);
+
+}  // namespace tessera
