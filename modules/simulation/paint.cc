@@ -41,6 +41,13 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
       return PaintSky(spec);
     case Material::kSkyline:
       return PaintSkyline(spec);
+    case Material::kCountryRoad:
+      if (map == nullptr) throw std::invalid_argument("a road needs a street map");
+      return PaintCountryRoad(spec, *map);
+    case Material::kField:
+      return PaintField(spec);
+    case Material::kRidge:
+      return PaintRidge(spec);
     case Material::kWallpaper:
       return PaintWallpaper(spec);
     case Material::kPoster:

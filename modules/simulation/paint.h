@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 
 #include "simulation/texture.h"
 
 namespace tessera {
 
 class StreetMap;
+struct StreetPosition;
 
 enum class Material {
   kFacade,  // windows, doors, shop fronts; plaster or brick
@@ -23,7 +25,10 @@ enum class Material {
   kCarRoof,
   kSign,
   kSky,
-  kSkyline,  // far buildings
+  kSkyline,      // far buildings
+  kCountryRoad,  // a road of little texture between fields, as the street map says for `origin`
+  kField,        // a meadow or an acre of little texture
+  kRidge,        // a wooded hill against the sky
   kWallpaper,
   kPoster,
   kBooks,
@@ -38,16 +43,25 @@ struct PaintSpec {
   double width_m = 1.0;  // extent of the surface
   double height_m = 1.0;
   double texel_m = 0.02;
-  Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // kGround: world x, z of the bottom left corner, m
+  // World x, z of the bottom left corner of ground, so that its grain goes on across tiles; along a ridge: x. m
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+  double tone = 100.0;     // gray of kCountryRoad's fields, kField, kRidge
+  double roughness = 1.0;  // kCountryRoad: how strong the texture of road and verge is
 };
 
-// `map` may be null if the material is not kGround.
+// `map` may be null if the material is neither kGround nor kCountryRoad.
 Texture Paint(const PaintSpec& spec, const StreetMap* map);
 
 // The single materials.
 Texture PaintFacade(const PaintSpec& spec);
 Texture PaintSkyline(const PaintSpec& spec);
 Texture PaintGround(const PaintSpec& spec, const StreetMap& map);
+Texture PaintCountryRoad(const PaintSpec& spec, const StreetMap& map);
+Texture PaintField(const PaintSpec& spec);
+Texture PaintRidge(const PaintSpec& spec);
+// Ground of which each texel's gray follows from its position in the street and its number x, y in the world.
+Texture PaintAlongStreet(const PaintSpec& spec, const StreetMap& map,
+                         const std::function<uint8_t(const StreetPosition&, int, int)>& gray_at);
 Texture PaintFoliage(const PaintSpec& spec);
 Texture PaintFence(const PaintSpec& spec);
 Texture PaintCarSide(const PaintSpec& spec);

@@ -62,7 +62,8 @@ double GroundTone(const StreetPosition& position, uint32_t seed, int x, int y) {
 
 }  // namespace
 
-Texture PaintGround(const PaintSpec& spec, const StreetMap& map) {
+Texture PaintAlongStreet(const PaintSpec& spec, const StreetMap& map,
+                         const std::function<uint8_t(const StreetPosition&, int, int)>& gray_at) {
   GrayImage image(std::max(2, static_cast<int>(std::lround(spec.width_m / spec.texel_m))),
                   std::max(2, static_cast<int>(std::lround(spec.height_m / spec.texel_m))));
   // The position in the street is looked up at every kStep-th texel and interpolated between.
@@ -85,10 +86,16 @@ Texture PaintGround(const PaintSpec& spec, const StreetMap& map) {
         here.along_m += part * (next.along_m - position.along_m);
         here.lateral_m += part * (next.lateral_m - position.lateral_m);
       }
-      image.row(y)[x] = ToGray(GroundTone(here, spec.seed, first_x + x, first_y + image.height - y));
+      image.row(y)[x] = gray_at(here, first_x + x, first_y + image.height - y);
     }
   }
   return MakeTexture(std::move(image), {});
+}
+
+Texture PaintGround(const PaintSpec& spec, const StreetMap& map) {
+  return PaintAlongStreet(spec, map, [&](const StreetPosition& position, int x, int y) {
+    return ToGray(GroundTone(position, spec.seed, x, y));
+  });
 }
 
 Texture PaintFoliage(const PaintSpec& spec) {

@@ -6,37 +6,49 @@
 #include <utility>
 
 #include "core/errors.h"
+#include "simulation/country.h"
 
 namespace tessera {
 namespace {
 
 using Scene = SimulationOptions::Scene;
 
-constexpr double kStreetBaselineM = 0.54;
-constexpr double kRoomBaselineM = 0.12;
 const Eigen::Vector3d kRoomM(6.4, 2.7, 5.2);
+constexpr CarMotion kCountryDrive{.cruise_mps = 17.0, .side_acceleration_mps2 = 3.5};
 
-bool IsStreet(Scene scene) { return scene != Scene::kRoom; }
+// What is mounted, and how often it takes a picture.
+struct CameraModel {
+  double width_px, height_px, focal_px, baseline_m, exposure_s, frames_per_s;
+};
+constexpr CameraModel kCarCamera{1241.0, 376.0, 718.0, 0.54, 0.004, 10.0};
+constexpr CameraModel kHandCamera{640.0, 480.0, 525.0, 0.12, 0.008, 30.0};
+
+constexpr CameraModel kWalkCamera{640.0, 480.0, 525.0, 0.12, 0.008, 2.0};
+
+const CameraModel& ModelOf(Scene scene) {
+  if (scene == Scene::kRoom) return kHandCamera;
+  return scene == Scene::kWalk ? kWalkCamera : kCarCamera;
+}
 
 CameraCalibration MakeCamera(const SimulationOptions& options, SensorType sensor) {
-  const bool is_street = IsStreet(options.scene);
+  const CameraModel& model = ModelOf(options.scene);
   const double s = options.scale;
   CameraCalibration camera;
   camera.sensor = sensor;
-  camera.width_px = static_cast<int>(std::lround(s * (is_street ? 1241 : 640)));
-  camera.height_px = static_cast<int>(std::lround(s * (is_street ? 376 : 480)));
-  camera.fx_px = camera.fy_px = s * (is_street ? 718.0 : 525.0);
+  camera.width_px = static_cast<int>(std::lround(s * model.width_px));
+  camera.height_px = static_cast<int>(std::lround(s * model.height_px));
+  camera.fx_px = camera.fy_px = s * model.focal_px;
   // Where a point of the image lies when pixels shrink: (c + 1/2) s - 1/2.
-  camera.cx_px = s * (is_street ? 620.5 : 320.0) - 0.5;
-  camera.cy_px = s * (is_street ? 188.0 : 240.0) - 0.5;
-  camera.baseline_m = sensor == SensorType::kStereo ? (is_street ? kStreetBaselineM : kRoomBaselineM) : 0.0;
+  camera.cx_px = s * 0.5 * model.width_px - 0.5;
+  camera.cy_px = s * 0.5 * model.height_px - 0.5;
+  camera.baseline_m = sensor == SensorType::kStereo ? model.baseline_m : 0.0;
   camera.depth_unit_m = sensor == SensorType::kRgbd ? 0.001 : 0.0;
   return camera;
 }
 
 CameraEffects MakeEffects(const SimulationOptions& options) {
   CameraEffects effects;
-  effects.exposure_s = IsStreet(options.scene) ? 0.004 : 0.008;
+  effects.exposure_s = ModelOf(options.scene).exposure_s;
   effects.read_noise *= options.noise;
   effects.shot_noise *= options.noise * options.noise;
   effects.depth_noise *= options.noise;
@@ -94,11 +106,16 @@ Result<> SimulationOptions::Check() const {
 SimulationOptions ParseSimulation(const std::string& text) {
   SimulationOptions options;
   const std::string name = text.substr(0, text.find(','));
-  const std::map<std::string, Scene> scenes{
-      {"street", Scene::kStreet}, {"street-short", Scene::kStreetShort}, {"room", Scene::kRoom}};
+  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet},
+                                            {"street-short", Scene::kStreetShort},
+                                            {"room", Scene::kRoom},
+                                            {"country", Scene::kCountry},
+                                            {"walk", Scene::kWalk}};
   const auto scene = scenes.find(name);
-  if (scene == scenes.end())
-    throw InputError("sim:" + name + " is unknown: give sim:street, sim:street-short or sim:room");
+  if (scene == scenes.end()) {
+    throw InputError("sim:" + name +
+                     " is unknown: give sim:street, sim:street-short, sim:room, sim:country or sim:walk");
+  }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
     const size_t end = std::min(text.find(',', begin + 1), text.size());
@@ -115,15 +132,35 @@ SimulationOptions ParseSimulation(const std::string& text) {
 Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
     : options_(options), camera_(MakeCamera(options, sensor)) {
   ThrowIfFailed<InputError>(options.Check());
-  if (IsStreet(options.scene)) {
-    const StreetPlan plan = MakePlan(options);
-    trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed);
-    renderer_ = std::make_unique<Renderer>(std::make_shared<const World>(BuildStreets(plan, options.seed)));
-  } else {
-    frames_per_s_ = 30.0;
-    trajectory_ = std::make_unique<HandTrajectory>(kRoomM, options.duration_s, options.speed, options.seed);
-    renderer_ = std::make_unique<Renderer>(std::make_shared<const World>(BuildRoom(kRoomM, options.seed)));
+  frames_per_s_ = ModelOf(options.scene).frames_per_s;
+  World world;
+  switch (options.scene) {
+    case Scene::kStreet:
+    case Scene::kStreetShort: {
+      const StreetPlan plan = MakePlan(options);
+      trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed);
+      world = BuildStreets(plan, options.seed);
+      break;
+    }
+    case Scene::kRoom:
+      trajectory_ = std::make_unique<HandTrajectory>(kRoomM, options.duration_s, options.speed, options.seed);
+      world = BuildRoom(kRoomM, options.seed);
+      break;
+    case Scene::kCountry: {
+      const CountryPlan plan = PlanCountry(options.seed, options.length_m);
+      const auto terrain = std::make_shared<const Terrain>(plan.road, options.seed);
+      trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed, kCountryDrive, terrain);
+      world = BuildCountry(plan, *terrain, options.seed);
+      break;
+    }
+    case Scene::kWalk: {
+      const StreetPlan plan = PlanStroll(options.seed, options.length_m);
+      trajectory_ = std::make_unique<WalkTrajectory>(plan.drive, options.speed, options.seed);
+      world = BuildStreets(plan, options.seed);
+      break;
+    }
   }
+  renderer_ = std::make_unique<Renderer>(std::make_shared<const World>(std::move(world)));
   num_frames_ = static_cast<int64_t>(trajectory_->duration_s() * frames_per_s_);
   effects_ = std::make_unique<EffectsPipeline>(camera_, MakeEffects(options), options.seed);
 }

@@ -14,7 +14,7 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kRoom };
+  enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;         // another seed, another town
   double length_m = 0.0;     // of a drive; 0: all of it
@@ -28,7 +28,8 @@ struct SimulationOptions {
   Result<> Check() const;
 };
 
-// Reads "street", "street-short" or "room", and options behind it: "street,seed=3,length=500". Throws InputError.
+// Reads the name of a world (street, street-short, room, country, walk) and options behind it:
+// "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 
 class Simulation {

@@ -26,8 +26,11 @@ struct Scene {
   const char* name;
   SensorType sensor;
 };
-constexpr Scene kScenes[] = {
-    {"street", SensorType::kStereo}, {"street-short", SensorType::kMono}, {"room", SensorType::kRgbd}};
+constexpr Scene kScenes[] = {{"street", SensorType::kStereo},
+                             {"street-short", SensorType::kMono},
+                             {"room", SensorType::kRgbd},
+                             {"country", SensorType::kMono},
+                             {"walk", SensorType::kStereo}};
 
 TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
   for (const Scene& scene : kScenes) {
