@@ -9,14 +9,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kMaxTaps = 9;         // samples along the motion of one pixel
 constexpr float kMinBlurPx = 0.6F;  // shorter motion can't be seen
-
-// About normal, standard deviation 1: the sum of a hash's four bytes, whose deviation is sqrt(4 (256^2 - 1) / 12).
-float NormalOf(uint32_t hash) {
-  const auto sum = static_cast<int>((hash & 255) + ((hash >> 8) & 255) + ((hash >> 16) & 255) + (hash >> 24));
-  return static_cast<float>(sum - 510) * (1.0F / 147.8F);
-}
 
 // Cheaper than HashOf, for one number per pixel.
 uint32_t PixelHash(uint32_t row_seed, uint32_t x) {
@@ -61,7 +54,7 @@ void EffectsPipeline::BlurMotion(const Rendering& rendering, const CameraVelocit
       const float dv = fy * ((-t.y() + y * t.z()) * w + (1.0F + y * y) * o.x() - x * y * o.y() - x * o.z());
       const float length = std::max(std::abs(du), std::abs(dv));
       if (length < kMinBlurPx) continue;
-      const int taps = std::clamp(static_cast<int>(length) + 2, 2, kMaxTaps);
+      const int taps = std::clamp(static_cast<int>(length) + 2, 2, effects_.max_blur_taps);
       int sum = 0;
       for (int k = 0; k < taps; ++k) {
         const float part = static_cast<float>(k) / static_cast<float>(taps - 1) - 0.5F;

@@ -12,6 +12,7 @@ namespace tessera {
 
 struct CameraEffects {
   double exposure_s = 0.006;     // motion blur: the shutter is open for so long
+  int max_blur_taps = 9;         // samples along the motion of one pixel
   double exposure_drift = 0.12;  // the gain wanders within 1 +- this, over some seconds
   double vignetting = 0.2;       // light lost in the corners
   double read_noise = 1.3;       // standard deviation in the dark, gray values

@@ -24,6 +24,12 @@ inline uint32_t HashOf(uint32_t a, uint32_t b = 0, uint32_t c = 0, uint32_t d = 
 // Maps a hash to [0, 1).
 inline float UnitOf(uint32_t hash) { return static_cast<float>(hash >> 8) * (1.0F / 16777216.0F); }
 
+// About normal, standard deviation 1: the sum of a hash's four bytes, whose deviation is sqrt(4 (256^2 - 1) / 12).
+inline float NormalOf(uint32_t hash) {
+  const auto sum = static_cast<int>((hash & 255) + ((hash >> 8) & 255) + ((hash >> 16) & 255) + (hash >> 24));
+  return static_cast<float>(sum - 510) * (1.0F / 147.8F);
+}
+
 // A sequence of random numbers. Draw at most one in the arguments of a call: C++ leaves their order open (in braces it
 // is from left to right).
 class Random {

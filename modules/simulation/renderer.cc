@@ -34,7 +34,9 @@ struct Plane {
 
 class Drawer {
  public:
-  Drawer(const CameraCalibration& camera, Rendering& out) : camera_(camera), out_(out) {}
+  // Draws rows [first_row, last_row).
+  Drawer(const CameraCalibration& camera, int first_row, int last_row, Rendering& out)
+      : camera_(camera), first_row_(first_row), last_row_(last_row), out_(out) {}
 
   // The surface is in the camera's frame.
   void Draw(const Surface& surface, const Texture& texture);
@@ -53,6 +55,7 @@ class Drawer {
   void DrawRow(const Plane& plane, const Surface& surface, const Texture& texture, int y, const Span& span);
 
   const CameraCalibration& camera_;
+  int first_row_, last_row_;
   Rendering& out_;
 };
 
@@ -180,8 +183,11 @@ void Drawer::Draw(const Surface& surface, const Texture& texture) {
     top = std::min(top, p.y());
     bottom = std::max(bottom, p.y());
   }
-  const int first = static_cast<int>(std::clamp(std::ceil(top), 0.0, static_cast<double>(camera_.height_px)));
-  const int last = static_cast<int>(std::clamp(std::ceil(bottom), 0.0, static_cast<double>(camera_.height_px)));
+  const auto row_of = [&](double y) {
+    return static_cast<int>(std::clamp(std::ceil(y), static_cast<double>(first_row_), static_cast<double>(last_row_)));
+  };
+  const int first = row_of(top), last = row_of(bottom);
+  if (first >= last) return;
   const Plane plane = MakePlane(surface, texture.levels[0]);
   for (int y = first; y < last; ++y) {
     const Span span = SpanOf(outline, y);
@@ -196,13 +202,18 @@ Surface InCamera(const Rigid3& camera_from_world, Surface surface) {
   return surface;
 }
 
-// Whether part of the surface, in the camera's frame, can lie inside the picture.
-bool IsInSight(const Surface& surface, const CameraCalibration& camera) {
-  if (!surface.two_sided && surface.across.cross(surface.up).dot(surface.corner) >= 0.0)
-    return false;  // seen from behind
+// Of a surface in the camera's frame.
+bool IsSeenFromBehind(const Surface& surface) {
+  return !surface.two_sided && surface.across.cross(surface.up).dot(surface.corner) >= 0.0;
+}
+
+// Whether part of the surface, in the camera's frame, can lie inside the picture or within `margin_px` around it.
+bool IsInSight(const Surface& surface, const CameraCalibration& camera, double margin_px) {
   // Planes through the eye and the picture's borders: all four corners beyond one of them can't be seen.
-  const double left = -camera.cx_px / camera.fx_px, right = (camera.width_px - camera.cx_px) / camera.fx_px;
-  const double top = -camera.cy_px / camera.fy_px, bottom = (camera.height_px - camera.cy_px) / camera.fy_px;
+  const double left = (-camera.cx_px - margin_px) / camera.fx_px;
+  const double right = (camera.width_px - camera.cx_px + margin_px) / camera.fx_px;
+  const double top = (-camera.cy_px - margin_px) / camera.fy_px;
+  const double bottom = (camera.height_px - camera.cy_px + margin_px) / camera.fy_px;
   int beyond[5] = {};
   for (const Eigen::Vector3d& p : surface.Corners()) {
     beyond[0] += p.z() < kNearM ? 1 : 0;
@@ -276,16 +287,19 @@ void PaintStore::MakeRoom() {
 Renderer::Renderer(std::shared_ptr<const World> world) : world_(std::move(world)), paints_(world_) {}
 Renderer::~Renderer() = default;
 
-void Renderer::Collect(const CameraCalibration& camera, const Rigid3& camera_from_world, double time_s) {
+void Renderer::Collect(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s,
+                       double margin_px) {
   // No moving car is drawn so near that it could sit on the camera.
   constexpr double kCarGapM = 4.5;
   visible_.clear();
+  const Rigid3 camera_from_world = world_from_camera.Inverse();
   const Eigen::Vector3d eye = camera_from_world.Inverse().translation;
   const auto add = [&](const Surface& surface, double sight_m) {
     const double distance = (surface.Center() - eye).norm() - 0.5 * (surface.across + surface.up).norm();
     if (distance >= sight_m) return;
-    const Surface in_camera = InCamera(camera_from_world, surface);
-    if (IsInSight(in_camera, camera)) visible_.push_back({distance, visible_.size(), in_camera});
+    if (IsInSight(InCamera(camera_from_world, surface), camera, margin_px)) {
+      visible_.push_back({distance, visible_.size(), surface});
+    }
   };
   for (const Surface& surface : world_->surfaces) add(surface, world_->sight_m);
   for (const Surface& surface : world_->far) add(surface, 1e9);
@@ -299,17 +313,38 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& camera_fro
   });
 }
 
-void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out) {
+void Renderer::Clear(const CameraCalibration& camera, Rendering& out) const {
   if (out.radiance.width != camera.width_px || out.radiance.height != camera.height_px) {
     out = {RadianceImage(camera.width_px, camera.height_px), InverseDepthImage(camera.width_px, camera.height_px)};
   }
   std::fill(out.radiance.pixels.begin(), out.radiance.pixels.end(), kHorizonGray);
   std::fill(out.inverse_depth.pixels.begin(), out.inverse_depth.pixels.end(), 0.0F);
+}
+
+void Renderer::DrawRows(const CameraCalibration& camera, const Rigid3& world_from_camera, int first, int last,
+                        Rendering& out) {
   const Rigid3 camera_from_world = world_from_camera.Inverse();
-  Collect(camera, camera_from_world, time_s);
-  Drawer drawer(camera, out);
+  Drawer drawer(camera, first, last, out);
   for (const Visible& visible : visible_) {
-    drawer.Draw(visible.surface, paints_.Get(visible.surface.paint));
+    const Surface surface = InCamera(camera_from_world, visible.surface);
+    if (IsSeenFromBehind(surface)) continue;
+    drawer.Draw(surface, paints_.Get(surface.paint));
+  }
+}
+
+void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out) {
+  Clear(camera, out);
+  Collect(camera, world_from_camera, time_s, 0.0);
+  DrawRows(camera, world_from_camera, 0, camera.height_px, out);
+}
+
+void Renderer::RenderRolling(const CameraCalibration& camera, const std::function<Rigid3(double)>& world_from_camera,
+                             double time_s, Rendering& out) {
+  Clear(camera, out);
+  Collect(camera, world_from_camera(0.5 * (camera.height_px - 1)), time_s, 0.3 * camera.fx_px);
+  for (int first = 0; first < camera.height_px; first += kBandRows) {
+    const int last = std::min(first + kBandRows, camera.height_px);
+    DrawRows(camera, world_from_camera(0.5 * (first + last - 1)), first, last, out);
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -50,13 +51,24 @@ class Renderer {
   // paint is looked up bilinearly in the level whose texels are about as large as a pixel.
   void Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out);
 
+  // A rolling shutter: the rows are seen one after another, each band of kBandRows rows from the pose of its middle,
+  // `world_from_camera(row)`. Cars stand where they are at `time_s`. The camera must not turn by more than some
+  // 0.3 rad while it reads.
+  static constexpr int kBandRows = 2;
+  void RenderRolling(const CameraCalibration& camera, const std::function<Rigid3(double)>& world_from_camera,
+                     double time_s, Rendering& out);
+
  private:
   struct Visible {
     double distance_m;
     size_t order;     // ties
-    Surface surface;  // in the camera's frame
+    Surface surface;  // in the world
   };
-  void Collect(const CameraCalibration& camera, const Rigid3& camera_from_world, double time_s);
+  // What can be seen within `margin_px` around the picture, from near to far.
+  void Collect(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, double margin_px);
+  void Clear(const CameraCalibration& camera, Rendering& out) const;
+  // Draws rows [first, last) of what was collected.
+  void DrawRows(const CameraCalibration& camera, const Rigid3& world_from_camera, int first, int last, Rendering& out);
 
   std::shared_ptr<const World> world_;
   PaintStore paints_;
