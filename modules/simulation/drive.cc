@@ -26,6 +26,19 @@ Eigen::Vector2d PointOn(const Polyline& points, double distance_m) {
   return points[i] + (position - static_cast<double>(i)) * (points[i + 1] - points[i]);
 }
 
+// How far someone looks aside who does so once in every kPeriodS: the tangent of half the angle, to the right.
+double AsideAt(double time_s, uint32_t seed) {
+  constexpr double kPeriodS = 2.75;
+  const double number = std::floor(time_s / kPeriodS);
+  Random random(HashOf(seed, 23, static_cast<uint32_t>(static_cast<int64_t>(number))));
+  const double begin = number * kPeriodS + random.Uniform(1.0, 1.2);
+  const double far = random.Uniform(0.24, 0.33) * (random.Chance(0.5) ? 1.0 : -1.0);
+  const double turn_s = random.Uniform(0.42, 0.5);
+  const double stay_s = random.Uniform(0.1, 0.5);
+  const auto ease = [](double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); };
+  return far * (ease((time_s - begin) / turn_s) - ease((time_s - begin - turn_s - stay_s) / turn_s));
+}
+
 }  // namespace
 
 Rigid3 LookAlong(const Eigen::Vector3d& position, const Eigen::Vector3d& forward) {
@@ -129,6 +142,27 @@ Rigid3 WalkTrajectory::WorldFromCamera(double time_s) const {
   const double yaw = 0.03 * gait + 0.16 * sway(5, 0.22);
   const Eigen::Quaterniond turn = Eigen::Quaterniond(1.0, 0.5 * pitch, 0.5 * yaw, 0.5 * roll).normalized();
   return {(level.rotation * turn).normalized(), level.translation};
+}
+
+DeskTrajectory::DeskTrajectory(double duration_s, double speed, uint32_t seed)
+    : duration_s_(duration_s), speed_(speed), seed_(seed) {}
+
+Rigid3 DeskTrajectory::WorldFromCamera(double time_s) const {
+  const double time = speed_ * time_s;
+  const auto noise = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, 21, axis), hertz * time); };
+  const double shift = static_cast<double>(UnitOf(HashOf(seed_, 22)));
+  const Eigen::Vector3d position(0.6 * Wave(time / 9.0 + shift) + 0.15 * noise(1, 0.5) + 0.003 * noise(2, 5.0),
+                                 -1.3 + 0.18 * Wave(time / 6.3 + shift) + 0.05 * noise(3, 0.8) + 0.003 * noise(4, 4.0),
+                                 -0.75 + 0.25 * Wave(time / 7.7) + 0.1 * noise(5, 0.6));
+  const Eigen::Vector3d target(0.5 * Wave(time / 5.5 + shift) + 0.2 * noise(6, 0.7), -0.85 + 0.12 * noise(7, 0.6),
+                               0.1 + 0.2 * noise(8, 0.5));
+  const Rigid3 level = LookAlong(position, target - position);
+  // Tangents of half the angle: no trigonometry.
+  const double aside = AsideAt(time, seed_);
+  const double pitch = 0.01 * noise(9, 3.0) + 0.12 * aside;
+  const double roll = 0.05 * noise(10, 0.7) + 0.006 * noise(11, 4.0);
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(1.0, pitch, aside + 0.006 * noise(12, 4.5), roll).normalized();
+  return {(level.rotation * turn).normalized(), position};
 }
 
 HandTrajectory::HandTrajectory(const Eigen::Vector3d& room_m, double duration_s, double speed, uint32_t seed)

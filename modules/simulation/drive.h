@@ -75,6 +75,20 @@ class HandTrajectory : public Trajectory {
   uint32_t seed_;
 };
 
+// A camera in someone's hand who looks at a desk (see BuildDesk) from all around it, and every few seconds quickly
+// aside and back, at up to some 3 rad/s.
+class DeskTrajectory : public Trajectory {
+ public:
+  DeskTrajectory(double duration_s, double speed, uint32_t seed);
+  double duration_s() const override { return duration_s_; }
+  Rigid3 WorldFromCamera(double time_s) const override;
+
+ private:
+  double duration_s_;
+  double speed_;
+  uint32_t seed_;
+};
+
 // The camera at `position` that looks along `forward` with its y axis downwards; `forward` must not be vertical.
 Rigid3 LookAlong(const Eigen::Vector3d& position, const Eigen::Vector3d& forward);
 

@@ -58,6 +58,14 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
       return PaintWood(spec);
     case Material::kCarpet:
       return PaintPlain(spec, 70.0 + 60.0 * tone, 30.0, 20.0);
+    case Material::kScreen:
+      return PaintScreen(spec);
+    case Material::kKeys:
+      return PaintKeys(spec);
+    case Material::kPaper:
+      return PaintPaper(spec);
+    case Material::kPackage:
+      return PaintPackage(spec);
     case Material::kCeiling:
       return PaintPlain(spec, 205.0, 3.0, 8.0);
   }

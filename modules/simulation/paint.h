@@ -34,6 +34,10 @@ enum class Material {
   kBooks,
   kWood,
   kCarpet,
+  kScreen,  // of a computer
+  kKeys,    // of its keyboard
+  kPaper,   // with lines of text and a drawing
+  kPackage,
   kCeiling,
 };
 
@@ -72,6 +76,10 @@ Texture PaintWallpaper(const PaintSpec& spec);
 Texture PaintPoster(const PaintSpec& spec);
 Texture PaintBooks(const PaintSpec& spec);
 Texture PaintWood(const PaintSpec& spec);
+Texture PaintScreen(const PaintSpec& spec);
+Texture PaintKeys(const PaintSpec& spec);
+Texture PaintPaper(const PaintSpec& spec);
+Texture PaintPackage(const PaintSpec& spec);
 // Of one tone with this grain: bark, curbs, car roofs, carpets, ceilings, hedges.
 Texture PaintPlain(const PaintSpec& spec, double tone, double fine, double coarse);
 

@@ -70,4 +70,63 @@ Texture PaintWood(const PaintSpec& spec) {
   return MakeTexture(std::move(canvas.image()), {});
 }
 
+// A black frame, a dark background, and windows with lines of text.
+Texture PaintScreen(const PaintSpec& spec) {
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, 14.0, {1.0, 1.0});
+  Random& random = canvas.random();
+  const double w = spec.width_m, h = spec.height_m;
+  if (w < 0.1) return MakeTexture(std::move(canvas.image()), {});  // seen from the side
+  canvas.Fill({0.02, 0.02, w - 0.04, h - 0.04}, 45.0, {1.0, 3.0});
+  for (int i = 0; i < 3; ++i) {
+    const double width = random.Uniform(0.3, 0.5) * w;
+    const double height = random.Uniform(0.4, 0.6) * h;
+    const double x = random.Uniform(0.03, w - width - 0.03);
+    const double y = random.Uniform(0.03, h - height - 0.03);
+    const double tone = random.Chance(0.5) ? 205.0 : 70.0;
+    canvas.Fill({x, y, width, height}, tone, {1.0, 1.0});
+    canvas.Fill({x, y + height - 0.012, width, 0.012}, 120.0, {1.0, 1.0});
+    canvas.Scribble({x + 0.01, y + 0.01, width - 0.02, height - 0.03}, 0.012, tone > 100.0 ? 60.0 : 180.0);
+  }
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+Texture PaintKeys(const PaintSpec& spec) {
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, 35.0, {2.0, 2.0});
+  constexpr double kKeyM = 0.019;
+  for (double y = 0.006; y + kKeyM < spec.height_m; y += kKeyM) {
+    for (double x = 0.006; x + kKeyM < spec.width_m; x += kKeyM) {
+      canvas.Fill({x, y, kKeyM - 0.004, kKeyM - 0.004}, canvas.random().Uniform(60.0, 85.0), {2.0, 2.0});
+      canvas.Fill({x + 0.004, y + 0.006, 0.005, 0.005}, 190.0, {2.0, 2.0});
+    }
+  }
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+Texture PaintPaper(const PaintSpec& spec) {
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, 215.0, {1.5, 3.0});
+  Random& random = canvas.random();
+  const double w = spec.width_m, h = spec.height_m;
+  for (double y = h - 0.03; y > 0.3 * h; y -= random.Chance(0.2) ? 0.02 : 0.009) {
+    canvas.Scribble({0.015, y, random.Uniform(0.4, 1.0) * (w - 0.03), 0.006}, 0.005, 70.0);
+  }
+  canvas.Fill({0.1 * w, 0.05 * h, random.Uniform(0.3, 0.8) * w, 0.2 * h}, random.Uniform(60.0, 180.0), {6.0, 25.0});
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
+Texture PaintPackage(const PaintSpec& spec) {
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, 120.0, {2.0, 5.0});
+  Random& random = canvas.random();
+  const double w = spec.width_m, h = spec.height_m;
+  const double tone = random.Uniform(60.0, 200.0);
+  canvas.Fill({0.0, 0.0, w, h}, tone, {2.0, 6.0});
+  for (int i = 0; i < 3; ++i) {
+    const double x = random.Uniform(0.0, 0.6) * w;
+    const double y = random.Uniform(0.0, 0.7) * h;
+    const double width = random.Uniform(0.2, 0.4) * w;
+    canvas.Fill({x, y, width, random.Uniform(0.1, 0.3) * h}, random.Uniform(45.0, 220.0), {3.0, 8.0});
+  }
+  canvas.Scribble({0.15 * w, random.Uniform(0.3, 0.6) * h, 0.7 * w, 0.25 * h}, 0.012, tone > 130.0 ? 45.0 : 210.0);
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
 }  // namespace tessera

@@ -7,6 +7,7 @@
 
 #include "core/errors.h"
 #include "simulation/country.h"
+#include "simulation/depth_sensor.h"
 
 namespace tessera {
 namespace {
@@ -18,16 +19,26 @@ constexpr CarMotion kCountryDrive{.cruise_mps = 17.0, .side_acceleration_mps2 = 
 
 // What is mounted, and how often it takes a picture.
 struct CameraModel {
-  double width_px, height_px, focal_px, baseline_m, exposure_s, frames_per_s;
+  double width_px, height_px, focal_px, baseline_m, exposure_s, frames_per_s, readout_s;
+  int max_blur_taps = 9;
 };
-constexpr CameraModel kCarCamera{1241.0, 376.0, 718.0, 0.54, 0.004, 10.0};
-constexpr CameraModel kHandCamera{640.0, 480.0, 525.0, 0.12, 0.008, 30.0};
+constexpr CameraModel kCarCamera{1241.0, 376.0, 718.0, 0.54, 0.004, 10.0, 0.0};
+constexpr CameraModel kHandCamera{640.0, 480.0, 525.0, 0.12, 0.008, 30.0, 0.0};
+constexpr CameraModel kKinect{640.0, 480.0, 525.0, 0.12, 0.012, 30.0, 0.025, 25};
 
-constexpr CameraModel kWalkCamera{640.0, 480.0, 525.0, 0.12, 0.008, 2.0};
+constexpr CameraModel kWalkCamera{640.0, 480.0, 525.0, 0.12, 0.008, 2.0, 0.0};
 
 const CameraModel& ModelOf(Scene scene) {
-  if (scene == Scene::kRoom) return kHandCamera;
-  return scene == Scene::kWalk ? kWalkCamera : kCarCamera;
+  switch (scene) {
+    case Scene::kRoom:
+      return kHandCamera;
+    case Scene::kWalk:
+      return kWalkCamera;
+    case Scene::kDesk:
+      return kKinect;
+    default:
+      return kCarCamera;
+  }
 }
 
 CameraCalibration MakeCamera(const SimulationOptions& options, SensorType sensor) {
@@ -49,6 +60,7 @@ CameraCalibration MakeCamera(const SimulationOptions& options, SensorType sensor
 CameraEffects MakeEffects(const SimulationOptions& options) {
   CameraEffects effects;
   effects.exposure_s = ModelOf(options.scene).exposure_s;
+  effects.max_blur_taps = ModelOf(options.scene).max_blur_taps;
   effects.read_noise *= options.noise;
   effects.shot_noise *= options.noise * options.noise;
   effects.depth_noise *= options.noise;
@@ -76,19 +88,17 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
     return;
   }
   const double number = ParseNumber(key, value);
-  const std::map<std::string, double*> numbers{{"length", &options.length_m},
-                                               {"duration", &options.duration_s},
-                                               {"speed", &options.speed},
-                                               {"noise", &options.noise},
-                                               {"scale", &options.scale}};
+  const std::map<std::string, double*> numbers{{"length", &options.length_m}, {"duration", &options.duration_s},
+                                               {"speed", &options.speed},     {"noise", &options.noise},
+                                               {"scale", &options.scale},     {"readout", &options.readout_ms}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
     options.seed = static_cast<uint32_t>(number);
   } else {
     throw InputError("sim: `" + key + "=" + value +
-                     "` is unknown or out of range: give seed, length (m), duration (s), speed, "
-                     "noise, scale or path");
+                     "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
+                     "speed, noise, scale or path");
   }
 }
 
@@ -100,21 +110,22 @@ Result<> SimulationOptions::Check() const {
   if (!(speed >= 0.05 && speed <= 10.0)) return Failed("sim: speed must be between 0.05 and 10 times the usual");
   if (!(noise >= 0.0 && noise <= 20.0)) return Failed("sim: noise must be between 0 and 20 times the usual");
   if (!(scale >= 0.1 && scale <= 4.0)) return Failed("sim: scale must be between 0.1 and 4 times the usual");
+  if (!(readout_ms == -1.0 || (readout_ms >= 0.0 && readout_ms <= 100.0))) {
+    return Failed("sim: readout must be between 0 and 100 ms");
+  }
   return {};
 }
 
 SimulationOptions ParseSimulation(const std::string& text) {
   SimulationOptions options;
   const std::string name = text.substr(0, text.find(','));
-  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet},
-                                            {"street-short", Scene::kStreetShort},
-                                            {"room", Scene::kRoom},
-                                            {"country", Scene::kCountry},
-                                            {"walk", Scene::kWalk}};
+  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort},
+                                            {"room", Scene::kRoom},     {"country", Scene::kCountry},
+                                            {"walk", Scene::kWalk},     {"desk", Scene::kDesk}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
-                     " is unknown: give sim:street, sim:street-short, sim:room, sim:country or sim:walk");
+                     " is unknown: give sim:street, sim:street-short, sim:room, sim:country, sim:walk or sim:desk");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -133,6 +144,7 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
     : options_(options), camera_(MakeCamera(options, sensor)) {
   ThrowIfFailed<InputError>(options.Check());
   frames_per_s_ = ModelOf(options.scene).frames_per_s;
+  readout_s_ = options.readout_ms < 0.0 ? ModelOf(options.scene).readout_s : 0.001 * options.readout_ms;
   World world;
   switch (options.scene) {
     case Scene::kStreet:
@@ -153,6 +165,10 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       world = BuildCountry(plan, *terrain, options.seed);
       break;
     }
+    case Scene::kDesk:
+      trajectory_ = std::make_unique<DeskTrajectory>(options.duration_s, options.speed, options.seed);
+      world = BuildDesk(options.seed);
+      break;
     case Scene::kWalk: {
       const StreetPlan plan = PlanStroll(options.seed, options.length_m);
       trajectory_ = std::make_unique<WalkTrajectory>(plan.drive, options.speed, options.seed);
@@ -181,26 +197,43 @@ CameraVelocity Simulation::VelocityAt(double time_s) const {
   return {step.translation / (2.0 * kStepS), 2.0 * step.rotation.vec() / (2.0 * kStepS)};
 }
 
-void Simulation::RenderPerfect(FrameId frame, Rendering& out) {
-  renderer_->Render(camera_, WorldFromCamera(frame), TimeOf(frame), out);
+Rigid3 Simulation::WorldFromCameraAtRow(FrameId frame, double row) const {
+  const double part = (row + 0.5) / camera_.height_px - 0.5;
+  return trajectory_->WorldFromCamera(TimeOf(frame) + part * readout_s_);
 }
+
+void Simulation::RenderEye(FrameId frame, double right_m, Rendering& out) {
+  const Rigid3 left_from_eye{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}};
+  if (readout_s_ == 0.0) {
+    renderer_->Render(camera_, WorldFromCamera(frame) * left_from_eye, TimeOf(frame), out);
+    return;
+  }
+  const auto world_from_eye = [&](double row) { return WorldFromCameraAtRow(frame, row) * left_from_eye; };
+  renderer_->RenderRolling(camera_, world_from_eye, TimeOf(frame), out);
+}
+
+void Simulation::RenderPerfect(FrameId frame, Rendering& out) { RenderEye(frame, 0.0, out); }
 
 CameraFrame Simulation::Render(FrameId id) {
   const double time = TimeOf(id);
-  const Rigid3 world_from_left = WorldFromCamera(id);
   const CameraVelocity velocity = VelocityAt(time);
   const auto picture = static_cast<uint32_t>(2 * id.value);
   CameraFrame frame;
   frame.id = id;
   frame.utime_us = UtimeOf(id);
   frame.sensor = camera_.sensor;
-  renderer_->Render(camera_, world_from_left, time, rendering_);
+  RenderEye(id, 0.0, rendering_);
   frame.left = effects_->Apply(rendering_, velocity, time, picture);
   if (camera_.sensor == SensorType::kRgbd) {
-    frame.depth = effects_->Depth(rendering_, picture);
+    if (options_.scene == Scene::kDesk) {
+      DepthSensor sensor;
+      sensor.disparity_noise_px *= options_.noise;
+      frame.depth = MeasureDepth(rendering_, camera_, sensor, options_.seed, picture);
+    } else {
+      frame.depth = effects_->Depth(rendering_, picture);
+    }
   } else if (camera_.sensor == SensorType::kStereo) {
-    const Rigid3 left_from_right{Eigen::Quaterniond::Identity(), {camera_.baseline_m, 0.0, 0.0}};
-    renderer_->Render(camera_, world_from_left * left_from_right, time, rendering_);
+    RenderEye(id, camera_.baseline_m, rendering_);
     frame.right = effects_->Apply(rendering_, velocity, time, picture + 1);
   }
   return frame;

@@ -14,21 +14,22 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk };
+  enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk, kDesk };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;         // another seed, another town
   double length_m = 0.0;     // of a drive; 0: all of it
-  double duration_s = 20.0;  // of a walk in the room
+  double duration_s = 20.0;  // of the hand's way in the room or at the desk
   double speed = 1.0;        // times the usual
   double noise = 1.0;        // times the usual noise of sensors
   double scale = 1.0;        // times the usual size of images
+  double readout_ms = -1.0;  // rolling shutter: from the first row to the last; -1: that of the world's camera
   std::string path;          // a drive along the poses of a KITTI file instead of through the town
 
   // Fails if a value is out of range.
   Result<> Check() const;
 };
 
-// Reads the name of a world (street, street-short, room, country, walk) and options behind it:
+// Reads the name of a world (street, street-short, room, country, walk, desk) and options behind it:
 // "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 
@@ -41,7 +42,10 @@ class Simulation {
   const CameraCalibration& calibration() const { return camera_; }
   int64_t num_frames() const { return num_frames_; }
   int64_t UtimeOf(FrameId frame) const;
+  // The pose at the middle row, if the shutter rolls.
   Rigid3 WorldFromCamera(FrameId frame) const;
+  // The pose when this row was exposed; depth rolls with the image.
+  Rigid3 WorldFromCameraAtRow(FrameId frame, double row) const;
   // Frames may be rendered in any order.
   CameraFrame Render(FrameId frame);
   // The picture before the effects of the camera.
@@ -50,10 +54,13 @@ class Simulation {
  private:
   double TimeOf(FrameId frame) const;
   CameraVelocity VelocityAt(double time_s) const;
+  // The picture of the left camera, or of one this far to its right.
+  void RenderEye(FrameId frame, double right_m, Rendering& out);
 
   SimulationOptions options_;
   CameraCalibration camera_;
   double frames_per_s_ = 10.0;
+  double readout_s_ = 0.0;
   int64_t num_frames_ = 0;
   std::unique_ptr<Trajectory> trajectory_;
   std::unique_ptr<Renderer> renderer_;

@@ -98,5 +98,7 @@ void PlantTree(const TreeKind& kind, const Eigen::Vector2d& foot, double ground_
 World BuildStreets(const StreetPlan& plan, uint32_t seed);
 // A furnished room with its middle at the origin; x, height, z.
 World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);
+// A desk at the origin, 0.72 m high, seen from where z is negative; a room around it.
+World BuildDesk(uint32_t seed);
 
 }  // namespace tessera
