@@ -32,8 +32,10 @@ double AsideAt(double time_s, uint32_t seed) {
   const double number = std::floor(time_s / kPeriodS);
   Random random(HashOf(seed, 23, static_cast<uint32_t>(static_cast<int64_t>(number))));
   const double begin = number * kPeriodS + random.Uniform(1.0, 1.2);
-  const double far = random.Uniform(0.24, 0.33) * (random.Chance(0.5) ? 1.0 : -1.0);
-  const double turn_s = random.Uniform(0.42, 0.5);
+  const double side = random.Chance(0.5) ? 1.0 : -1.0;
+  const bool is_wide = random.Chance(0.4);  // the desk leaves the image
+  const double far = side * (is_wide ? random.Uniform(0.42, 0.52) : random.Uniform(0.24, 0.32));
+  const double turn_s = is_wide ? random.Uniform(0.58, 0.68) : random.Uniform(0.42, 0.5);
   const double stay_s = random.Uniform(0.1, 0.5);
   const auto ease = [](double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); };
   return far * (ease((time_s - begin) / turn_s) - ease((time_s - begin - turn_s - stay_s) / turn_s));
@@ -58,7 +60,9 @@ CarTrajectory::CarTrajectory(const Polyline& drive, double speed, uint32_t seed,
   std::vector<double> speeds(points_.size());
   for (size_t i = 0; i < points_.size(); ++i) {
     // Curvature over 3 m: |second difference| / step^2.
-    const auto k = static_cast<ptrdiff_t>(i);
+    auto k = static_cast<ptrdiff_t>(i);
+    if (motion.drives_on)
+      k = std::clamp<ptrdiff_t>(k, 12, std::max<ptrdiff_t>(12, static_cast<ptrdiff_t>(points_.size()) - 13));
     const double curvature = (at(k - 12) - 2.0 * at(k) + at(k + 12)).norm() / (9.0);
     speeds[i] = std::min(motion.cruise_mps, std::sqrt(motion.side_acceleration_mps2 / std::max(curvature, 1e-4)));
   }

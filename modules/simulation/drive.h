@@ -23,6 +23,7 @@ struct CarMotion {
   double cruise_mps = 8.0;
   double side_acceleration_mps2 = 2.2;  // at most, in bends
   double acceleration_mps2 = 1.6;       // at most, along the way
+  bool drives_on = false;               // the way is part of a longer one; else the car starts and ends slowly
 };
 
 // A car that slows down in bends, on a suspension that nods, rolls and heaves a little.

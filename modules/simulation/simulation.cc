@@ -15,7 +15,7 @@ namespace {
 using Scene = SimulationOptions::Scene;
 
 const Eigen::Vector3d kRoomM(6.4, 2.7, 5.2);
-constexpr CarMotion kCountryDrive{.cruise_mps = 17.0, .side_acceleration_mps2 = 3.5};
+constexpr CarMotion kCountryDrive{.cruise_mps = 17.0, .side_acceleration_mps2 = 3.5, .drives_on = true};
 
 // What is mounted, and how often it takes a picture.
 struct CameraModel {
@@ -24,7 +24,7 @@ struct CameraModel {
 };
 constexpr CameraModel kCarCamera{1241.0, 376.0, 718.0, 0.54, 0.004, 10.0, 0.0};
 constexpr CameraModel kHandCamera{640.0, 480.0, 525.0, 0.12, 0.008, 30.0, 0.0};
-constexpr CameraModel kKinect{640.0, 480.0, 525.0, 0.12, 0.012, 30.0, 0.025, 25};
+constexpr CameraModel kKinect{640.0, 480.0, 525.0, 0.12, 0.016, 30.0, 0.025, 25};
 
 constexpr CameraModel kWalkCamera{640.0, 480.0, 525.0, 0.12, 0.008, 2.0, 0.0};
 
