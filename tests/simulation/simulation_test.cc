@@ -25,10 +25,14 @@ std::string HashOfFrame(const CameraFrame& frame) {
 struct Scene {
   const char* name;
   SensorType sensor;
+  std::vector<int64_t> frames;  // that are looked at
 };
-constexpr Scene kScenes[] = {{"street", SensorType::kStereo}, {"street-short", SensorType::kMono},
-                             {"room", SensorType::kRgbd},     {"country", SensorType::kMono},
-                             {"walk", SensorType::kStereo},   {"desk", SensorType::kRgbd}};
+const Scene kScenes[] = {{"street", SensorType::kStereo, {10, 130, 300}},
+                         {"street-short", SensorType::kMono, {10, 130, 300}},
+                         {"room", SensorType::kRgbd, {10, 130, 300}},
+                         {"country", SensorType::kMono, {150}},  // takes a second to paint
+                         {"walk", SensorType::kStereo, {20}},
+                         {"desk", SensorType::kRgbd, {10, 150, 300}}};
 
 TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
   for (const Scene& scene : kScenes) {
@@ -36,8 +40,7 @@ TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
     Simulation second(Small(scene.name), scene.sensor);
     const std::string expected = HashOfFrame(first.Render(FrameId{40}));
     EXPECT_EQ(HashOfFrame(first.Render(FrameId{40})), expected) << scene.name;
-    second.Render(FrameId{200});
-    second.Render(FrameId{3});
+    for (const int64_t frame : scene.frames) second.Render(FrameId{frame});
     EXPECT_EQ(HashOfFrame(second.Render(FrameId{40})), expected) << scene.name;
     EXPECT_NE(HashOfFrame(second.Render(FrameId{41})), expected) << scene.name;
   }
@@ -126,7 +129,7 @@ double ExpectSameGray(const Simulation& simulation, FrameId from_frame, FrameId 
 TEST(Simulation, DepthAndPoseExplainTheNextImage) {
   for (const Scene& scene : kScenes) {
     Simulation simulation(ParseSimulation(scene.name), scene.sensor);
-    for (const int64_t number : {10, 130, 300}) {
+    for (const int64_t number : scene.frames) {
       Rendering from, to;
       simulation.RenderPerfect(FrameId{number}, from);
       simulation.RenderPerfect(FrameId{number + 1}, to);
