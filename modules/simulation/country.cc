@@ -78,7 +78,7 @@ void AddOpen(const std::vector<double>& value, size_t num, Random& random, std::
   const size_t wanted = open.size() + num;
   for (const size_t post : posts) {
     if (open.size() == wanted) return;
-    const double half = 0.5 * random.Uniform(60.0, 200.0);
+    const double half = 0.5 * random.Uniform(20.0, 130.0);
     const double middle = 5.0 * static_cast<double>(post);
     const Stretch stretch{Stretch::Kind::kOpen, middle - half, middle + half};
     const bool is_apart = std::none_of(open.begin(), open.end(), [&](const Stretch& other) {

@@ -29,11 +29,12 @@ struct CountryPlan {
   std::vector<Stretch> stretches;  // in order, without gaps
 };
 
-// A lap of 4 km. Its sharpest bends, and some other stretches of 60 to 200 m, are open; where it begins and closes, it
-// is not. Only the first `length_m` are driven; 0: all of it.
+// A lap of 4 km. Its sharpest bends and some other stretches are open: along 90 to 200 m of road, kOpenM before and
+// behind a stretch included, nothing stands near. Where the lap begins and closes it is not open. Only the first
+// `length_m` are driven; 0: all of it.
 CountryPlan PlanCountry(uint32_t seed, double length_m);
 // Nothing stands within this distance of an open stretch.
-inline constexpr double kOpenM = 70.0;
+inline constexpr double kOpenM = 35.0;
 World BuildCountry(const CountryPlan& plan, const Terrain& terrain, uint32_t seed);
 
 }  // namespace tessera

@@ -17,8 +17,9 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
     case Material::kFacade:
       return PaintFacade(spec);
     case Material::kGround:
+    case Material::kCountryRoad:
       if (map == nullptr) throw std::invalid_argument("ground needs a street map");
-      return PaintGround(spec, *map);
+      return spec.material == Material::kGround ? PaintGround(spec, *map) : PaintCountryRoad(spec, *map);
     case Material::kCurb:
       return PaintPlain(spec, 150.0, 14.0, 14.0);
     case Material::kFoliage:
@@ -41,9 +42,6 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
       return PaintSky(spec);
     case Material::kSkyline:
       return PaintSkyline(spec);
-    case Material::kCountryRoad:
-      if (map == nullptr) throw std::invalid_argument("a road needs a street map");
-      return PaintCountryRoad(spec, *map);
     case Material::kField:
       return PaintField(spec);
     case Material::kRidge:

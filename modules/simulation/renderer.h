@@ -10,6 +10,7 @@
 #include "core/image.h"
 #include "geometry/camera.h"
 #include "geometry/rigid3.h"
+#include "simulation/paint_store.h"
 #include "simulation/world.h"
 
 namespace tessera {
@@ -20,26 +21,6 @@ using InverseDepthImage = Image<float>;  // 1 / z of the surface in the middle o
 struct Rendering {
   RadianceImage radiance;
   InverseDepthImage inverse_depth;
-};
-
-// Paints of a world, made when first seen and kept while lately used.
-class PaintStore {
- public:
-  explicit PaintStore(std::shared_ptr<const World> world);
-  const Texture& Get(int32_t paint);
-
- private:
-  struct Entry {
-    Texture texture;
-    size_t num_bytes = 0;
-    uint64_t last_use = 0;
-  };
-  void MakeRoom();
-
-  std::shared_ptr<const World> world_;
-  std::vector<std::unique_ptr<Entry>> entries_;  // by paint
-  size_t num_bytes_ = 0;
-  uint64_t num_uses_ = 0;
 };
 
 class Renderer {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "simulation/canvas.h"
+#include "simulation/paint_store.h"
 
 namespace tessera {
 namespace {
@@ -42,7 +43,8 @@ TEST(Texture, EachLevelHalvesTheOneBeforeAndKeepsItsMean) {
 }
 
 TEST(Paint, IsAFunctionOfItsSpecification) {
-  for (const Material material : {Material::kFacade, Material::kFoliage, Material::kCarSide, Material::kBooks}) {
+  for (const Material material : {Material::kFacade, Material::kFoliage, Material::kCarSide, Material::kBooks,
+                                  Material::kField, Material::kScreen, Material::kPaper, Material::kPackage}) {
     const PaintSpec spec{.material = material, .seed = 7, .width_m = 3.0, .height_m = 2.0};
     PaintSpec other = spec;
     other.seed = 8;
@@ -53,6 +55,18 @@ TEST(Paint, IsAFunctionOfItsSpecification) {
     EXPECT_NE(texture.levels[0].pixels, Paint(other, nullptr).levels[0].pixels);
     EXPECT_EQ(texture.cover.empty(), material != Material::kFoliage) << "one looks through leaves alone";
   }
+}
+
+TEST(PaintStore, GivesThePaintOfTheNumberAndKeepsIt) {
+  World world;
+  for (const uint32_t seed : {1, 2}) {
+    world.paints.push_back({.material = Material::kPaper, .seed = seed, .width_m = 0.2, .height_m = 0.3});
+  }
+  PaintStore store(std::make_shared<const World>(world));
+  const Texture& second = store.Get(1);
+  EXPECT_EQ(second.levels[0].pixels, Paint(world.paints[1], nullptr).levels[0].pixels);
+  EXPECT_NE(store.Get(0).levels[0].pixels, second.levels[0].pixels);
+  EXPECT_EQ(&store.Get(1), &second);
 }
 
 }  // namespace
