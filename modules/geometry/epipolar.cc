@@ -26,8 +26,8 @@ std::optional<Eigen::Matrix3d> NullMatrix(const Matrix9d& normal) {
   return Eigen::Matrix3d(Eigen::Matrix3d::Map(v->data()).transpose());
 }
 
-// The larger eigenvalue of a symmetric 2x2 matrix, given by its lower triangle. It is tridiagonal as it is, which spares
-// Eigen's first step.
+// The larger eigenvalue of a symmetric 2x2 matrix, given by its lower triangle. It is tridiagonal as it is, which
+// spares Eigen's first step.
 double LargerEigenvalue(const Eigen::Matrix2d& matrix) {
   const double largest = std::max({std::abs(matrix(0, 0)), std::abs(matrix(1, 0)), std::abs(matrix(1, 1))});
   const double scale = largest > 0.0 ? largest : 1.0;
