@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-MODULES = Path(__file__).resolve().parents[1] / "modules"
-INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]', re.MULTILINE)
+from helpers.includes import INCLUDE, MODULES, includes
+
 LCM_HEADER = re.compile(r"^lcm/")
 TYPE_HEADER = re.compile(r"^tessera/(\w+_t\.hpp|type_texts\.h)$")  # generated from lcmtypes/
 
@@ -21,11 +21,6 @@ def layers() -> list[str]:
 
 def sources() -> list[Path]:
     return sorted(path for path in MODULES.rglob("*") if path.suffix in (".h", ".cc"))
-
-
-def includes(path: Path) -> list[tuple[str, str]]:
-    """(quote or bracket, header) of every include."""
-    return INCLUDE.findall(path.read_text())
 
 
 def layer_of(path: Path) -> str:

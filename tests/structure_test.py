@@ -1,11 +1,6 @@
 """The shape of modules/: no include cycles, and every header is known to a test."""
 
-import re
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parents[1]
-MODULES = ROOT / "modules"
-INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
+from helpers.includes import MODULES, ROOT, own_includes
 
 # Headers that no test includes itself, each with what covers it. A new header belongs in a test, not in this list.
 COVERED_BY_OTHERS = {
@@ -50,9 +45,7 @@ COVERED_BY_OTHERS = {
 
 def headers() -> dict[str, set[str]]:
     """Every header of modules/ with the headers that it includes itself."""
-    return {
-        str(path.relative_to(MODULES)): set(INCLUDE.findall(path.read_text())) for path in sorted(MODULES.rglob("*.h"))
-    }
+    return {str(path.relative_to(MODULES)): own_includes(path) for path in sorted(MODULES.rglob("*.h"))}
 
 
 def included_by_tests() -> set[str]:
@@ -61,7 +54,7 @@ def included_by_tests() -> set[str]:
         for path in (ROOT / "tests").rglob("*")
         if path.suffix in (".h", ".cc") and path.parent.name != "benchmarks"
     ]
-    return {header for path in sources for header in INCLUDE.findall(path.read_text())}
+    return {header for path in sources for header in own_includes(path)}
 
 
 def find_cycle(graph: dict[str, set[str]]) -> list[str]:

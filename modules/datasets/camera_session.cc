@@ -7,9 +7,22 @@
 
 namespace tessera {
 
-CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const PacerOptions& pace, int64_t num_on_the_way,
-                             int64_t now_us)
-    : source_(std::move(source)), pacer_(pace), renumbering_(num_on_the_way), last_progress_us_(now_us) {}
+namespace {
+
+// A live source has its own pace.
+PacerOptions PaceOf(const FrameSource& source, const CameraSessionOptions& options) {
+  PacerOptions pace = options.pace;
+  if (source.is_live() || !options.is_followed) pace.kind = PacerOptions::Kind::kFree;
+  return pace;
+}
+
+}  // namespace
+
+CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us)
+    : source_(std::move(source)),
+      pacer_(PaceOf(*source_, options)),
+      renumbering_(options.num_on_the_way),
+      last_progress_us_(now_us) {}
 
 void CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us) {
   if (frame > tracked_) {
@@ -37,41 +50,62 @@ void CameraSession::PassOverTracked() {
   pacer_.RestartClock();
 }
 
-void CameraSession::Read() {
+CameraActions CameraSession::Advance(int64_t now_us) {
+  switch (Look(now_us)) {
+    case State::kMustRead:
+      return Read();
+    case State::kReady:
+      return Send(now_us);
+    case State::kAtEnd: {
+      CameraActions actions = End();
+      actions.emplace_back(Finish{});
+      return actions;
+    }
+    case State::kWaits:
+    case State::kEnded:
+      break;
+  }
+  return {};
+}
+
+CameraActions CameraSession::Read() {
   try {
     next_ = source_->Next();
-  } catch (const InputError&) {
+  } catch (const InputError& error) {
     has_ended_ = true;
-    throw;
+    return {Fail{.sentence = error.what(), .is_user_error = true}};
   }
   is_exhausted_ = !next_;
   if (next_) renumbering_.Apply(*next_);
+  return {};
 }
 
-CameraSession::Shipment CameraSession::Send(int64_t now_us) {
-  Shipment shipment{TruthsUpTo(next_->id), std::move(*next_)};
-  next_.reset();
-  last_sent_ = shipment.frame.id;
+CameraActions CameraSession::Send(int64_t now_us) {
+  last_sent_ = next_->id;
   pacer_.MarkSent(last_sent_);
   last_progress_us_ = now_us;
   ++num_sent_;
-  return shipment;
+  CameraActions actions = TruthsUpTo(last_sent_);
+  actions.emplace_back(*std::exchange(next_, std::nullopt));
+  return actions;
 }
 
-std::vector<GroundTruthPose> CameraSession::TruthsUpTo(FrameId frame) {
+CameraActions CameraSession::TruthsUpTo(FrameId frame) {
   const std::vector<GroundTruthPose>& all = source_->ground_truth();
-  std::vector<GroundTruthPose> truths;
+  CameraActions truths;
   for (; num_truths_sent_ < all.size() && all[num_truths_sent_].frame <= frame; ++num_truths_sent_) {
-    truths.push_back(all[num_truths_sent_]);
+    truths.emplace_back(all[num_truths_sent_]);
   }
   return truths;
 }
 
-std::optional<CameraSession::Ending> CameraSession::End() {
-  if (has_ended_) return std::nullopt;
+CameraActions CameraSession::End() {
+  if (has_ended_) return {};
   has_ended_ = true;
   last_sent_ = std::max(last_sent_, tracked_);
-  return Ending{TruthsUpTo(last_sent_), {.stage = StageKind::kCamera, .num_frames = last_sent_.value + 1}};
+  CameraActions actions = TruthsUpTo(last_sent_);
+  actions.emplace_back(EndOfStream{.stage = StageKind::kCamera, .num_frames = last_sent_.value + 1});
+  return actions;
 }
 
 std::optional<std::string> CameraSession::Watch(int64_t now_us) {

@@ -1,11 +1,11 @@
 // What the camera does with its source and with the poses that come back: which frame is sent, with which number, and
-// when. No bus, and the time is told.
+// when. Poses in, actions out. No bus, and the time is told.
 //
-//   kMustRead  Read() reads the next frame ahead, so that decoding it delays nobody
+//   kMustRead  Advance() reads the next frame ahead, so that decoding it delays nobody
 //   kWaits     the frame that was read may not go yet (pacer.h)
-//   kReady     Send() sends it
-//   kAtEnd     the source has no more frames: End() ends the stream
-//   kEnded     the stream has ended, or broke off
+//   kReady     Advance() sends it, behind the true poses up to it
+//   kAtEnd     the source has no more frames: Advance() ends the stream
+//   kEnded     the stream has ended, or broke off at a damaged image and gets no end
 //
 // A camera that was started again learns from POSE what is tracked, and continues behind it: what was on its way is
 // sent once more. A recorded source keeps its numbers; a live one gets higher ones (renumbering.h).
@@ -15,8 +15,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "core/session_actions.h"
 #include "datasets/frame_source.h"
 #include "datasets/pacer.h"
 #include "datasets/renumbering.h"
@@ -24,32 +26,31 @@
 
 namespace tessera {
 
+struct CameraSessionOptions {
+  PacerOptions pace;           // of a source that can be delayed
+  bool is_followed = true;     // false: nobody tracks the frames and answers with poses, so nothing is waited for
+  int64_t num_on_the_way = 0;  // frames that the dispatcher can have taken, beyond the last one tracked
+};
+
+// Values are to be published.
+using CameraAction = std::variant<GroundTruthPose, CameraFrame, EndOfStream, Fail, Finish>;
+using CameraActions = std::vector<CameraAction>;
+
 class CameraSession {
  public:
   enum class State { kMustRead, kWaits, kReady, kAtEnd, kEnded };
-  struct Shipment {
-    std::vector<GroundTruthPose> truths;  // up to this frame, to be sent first
-    CameraFrame frame;
-  };
-  struct Ending {
-    std::vector<GroundTruthPose> truths;
-    EndOfStream end;
-  };
 
-  // `num_on_the_way`: frames that the dispatcher can have taken, beyond the last one tracked.
-  CameraSession(std::unique_ptr<FrameSource> source, const PacerOptions& pace, int64_t num_on_the_way, int64_t now_us);
+  CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us);
 
   const FrameSource& source() const { return *source_; }
   // This frame, taken at `utime_us`, and all before it, have a pose.
   void MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
-  // Needs kMustRead. Throws InputError at a damaged image: the stream has broken off then, and gets no end.
-  void Read();
-  // Needs kReady.
-  Shipment Send(int64_t now_us);
-  // Ends the stream, here if need be; nullopt if it has ended.
-  std::optional<Ending> End();
+  // Takes the step of the state that Look() just told; none where the camera waits or has ended.
+  CameraActions Advance(int64_t now_us);
+  // Ends the stream, here if need be; nothing if it has ended.
+  CameraActions End();
   // One sentence when lockstep has waited for a pose for too long, once each time. To be called once a second.
   std::optional<std::string> Watch(int64_t now_us);
 
@@ -61,7 +62,9 @@ class CameraSession {
 
  private:
   void PassOverTracked();
-  std::vector<GroundTruthPose> TruthsUpTo(FrameId frame);
+  CameraActions Read();
+  CameraActions Send(int64_t now_us);
+  CameraActions TruthsUpTo(FrameId frame);
 
   std::unique_ptr<FrameSource> source_;
   Pacer pacer_;

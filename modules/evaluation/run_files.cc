@@ -145,12 +145,16 @@ std::string RunJson(const RunRecord& record) {
   return json.dump(2) + "\n";
 }
 
-void WriteRun(const RunRecord& record, const std::string& folder) {
+void MakeRunFolder(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
-    throw InputError("folder " + folder + " can't be made: " + error.message());
+    throw InputError("the run's folder " + folder + " can't be made: " + error.message() + "; choose another one");
   }
+}
+
+void WriteRun(const RunRecord& record, const std::string& folder) {
+  MakeRunFolder(folder);
   WriteFile(folder + "/trajectory.txt", TumText(record.Trajectory()));
   WriteFile(folder + "/trajectory_live.txt", TumText(record.LiveTrajectory()));
   WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame()));

@@ -18,6 +18,9 @@ std::string LoopsCsv(const RunRecord& record);
 // The figures of the run (INTERFACE: `summary.json` is made of them), as JSON.
 std::string RunJson(const RunRecord& record);
 
+// Makes the folder if need be. Throws InputError if it can't be made.
+void MakeRunFolder(const std::string& folder);
+
 // Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, map.ply, ground_truth.txt,
 // frames.csv, loops.csv and, at the very end, run.json into the folder, which is made if need be. Throws InputError if
 // one can't be written.

@@ -33,7 +33,7 @@ void RunRecord::AddGroundTruth(const GroundTruthPose& truth) {
   truth_.try_emplace(truth.frame, truth.frame, truth.utime_us, truth.world_from_camera);
 }
 
-void RunRecord::SetStage(const std::string& name, const StageFigures& figures) { stages_[name] = figures; }
+void RunRecord::SetStage(const std::string& name, const StageRecord& figures) { stages_[name] = figures; }
 
 void RunRecord::SetEnd(int64_t num_frames, int64_t num_dropped) {
   end_num_frames_ = num_frames;

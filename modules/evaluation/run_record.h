@@ -43,8 +43,8 @@ struct FrameCounts {
   int64_t relocalizations = 0;    // changes back, into a part of the map that was there before
 };
 
-// The latest figures of a stage.
-struct StageFigures {
+// The latest figures that a stage told.
+struct StageRecord {
   Statistics step_ms;
   int64_t num_repaired = 0;              // messages
   int64_t num_lost = 0;                  // messages
@@ -62,7 +62,7 @@ class RunRecord {
   void AddRemoved(const RemovedInDelta& removed);
   void AddGroundTruth(const GroundTruthPose& truth);
   // Replaces earlier figures.
-  void SetStage(const std::string& name, const StageFigures& figures);
+  void SetStage(const std::string& name, const StageRecord& figures);
   // The tracker has seen the end: one past the last frame's number, and how many frames never reached it.
   void SetEnd(int64_t num_frames, int64_t num_dropped);
 
@@ -73,7 +73,7 @@ class RunRecord {
   std::vector<FrameRecord> Frames() const;
   FrameCounts Counts() const;
   const Map& map() const { return map_; }
-  const std::map<std::string, StageFigures>& stages() const { return stages_; }
+  const std::map<std::string, StageRecord>& stages() const { return stages_; }
 
   // Tracked frames, where the map puts them at the end, also those whose reference is no longer in it:
   //   world_from_camera = world_from_reference (now) * reference_from_camera (then)
@@ -100,7 +100,7 @@ class RunRecord {
   Map map_;
   RemovedKeyframes removed_;
   std::map<FrameId, StampedPose> truth_;
-  std::map<std::string, StageFigures> stages_;
+  std::map<std::string, StageRecord> stages_;
   std::optional<int64_t> end_num_frames_;
   std::optional<int64_t> end_num_dropped_;
 };

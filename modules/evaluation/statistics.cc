@@ -3,18 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/quantile.h"
+
 namespace tessera {
-namespace {
-
-double Quantile(const std::vector<double>& sorted, double q) {
-  const double position = q * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<size_t>(position);
-  const size_t above = std::min(below + 1, sorted.size() - 1);
-  const double fraction = position - static_cast<double>(below);
-  return (1.0 - fraction) * sorted[below] + fraction * sorted[above];
-}
-
-}  // namespace
 
 std::optional<Statistics> Summarize(std::vector<double> values) {
   if (values.empty()) {

@@ -17,8 +17,7 @@ struct Statistics {
   double max = 0.0;
 };
 
-// Quantile q of n sorted values is at index (n - 1) q, interpolated linearly.
-// nullopt if there are no values.
+// Quantiles are those of core/quantile.h. nullopt if there are no values.
 std::optional<Statistics> Summarize(std::vector<double> values);
 
 }  // namespace tessera

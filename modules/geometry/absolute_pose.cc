@@ -1,13 +1,40 @@
 #include "geometry/absolute_pose.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "geometry/reprojection.h"
 #include "geometry/sampling.h"
 
 namespace tessera {
 namespace {
+
+// The four eigenvalues of a 4x4 matrix with zeros below its subdiagonal (a Hessenberg matrix).
+std::array<std::complex<double>, 4> EigenvaluesOfHessenberg(const Eigen::Matrix4d& matrix) {
+  // Eigen's EigenSolver would first bring it into that form.
+  const double scale = matrix.cwiseAbs().maxCoeff();
+  Eigen::RealSchur<Eigen::Matrix4d> schur;
+  schur.computeFromHessenberg(Eigen::Matrix4d(matrix / scale), Eigen::Matrix4d(), false);
+  const Eigen::Matrix4d t = schur.matrixT() * scale;  // triangular, but for 2x2 blocks of two conjugate eigenvalues
+  std::array<std::complex<double>, 4> values;
+  for (int i = 0; i < 4; ++i) {
+    const auto k = static_cast<size_t>(i);
+    if (i == 3 || t(i + 1, i) == 0.0) {
+      values[k] = t(i, i);
+      continue;
+    }
+    const double p = 0.5 * (t(i, i) - t(i + 1, i + 1));
+    const double largest = std::max({std::abs(p), std::abs(t(i + 1, i)), std::abs(t(i, i + 1))});
+    const double p0 = p / largest;
+    const double z = largest * std::sqrt(std::abs(p0 * p0 + t(i + 1, i) / largest * (t(i, i + 1) / largest)));
+    values[k] = {t(i + 1, i + 1) + p, z};
+    values[k + 1] = std::conj(values[k]);
+    ++i;
+  }
+  return values;
+}
 
 // Real roots of c[4] x^4 + ... + c[0], as eigenvalues of the companion matrix, each polished by Newton's method.
 std::vector<double> RealRoots(const std::array<double, 5>& c) {
@@ -20,11 +47,10 @@ std::vector<double> RealRoots(const std::array<double, 5>& c) {
   if (!companion.allFinite()) {
     return {};
   }
-  const Eigen::EigenSolver<Eigen::Matrix4d> solver(companion, false);
   std::vector<double> roots;
-  for (int i = 0; i < 4; ++i) {
-    double x = solver.eigenvalues()(i).real();
-    if (std::abs(solver.eigenvalues()(i).imag()) > 1e-3 * (1.0 + std::abs(x))) {
+  for (const std::complex<double>& root : EigenvaluesOfHessenberg(companion)) {
+    double x = root.real();
+    if (std::abs(root.imag()) > 1e-3 * (1.0 + std::abs(x))) {
       continue;
     }
     for (int step = 0; step < 3; ++step) {

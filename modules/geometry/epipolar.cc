@@ -4,31 +4,36 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "geometry/decompositions.h"
 #include "geometry/reprojection.h"
 
 namespace tessera {
 namespace {
 
-using Matrix9d = Eigen::Matrix<double, 9, 9>;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
-using Vector9d = Eigen::Matrix<double, 9, 1>;
 
-// Unit vector that `normal` (symmetric) shrinks most, as a row-major 3x3 matrix. nullopt if a second vector is shrunk
-// as much: then the measurements don't fix the matrix.
+// The measurements' null vector as a row-major 3x3 matrix; nullopt if they don't fix one.
 std::optional<Eigen::Matrix3d> NullMatrix(const Matrix9d& normal) {
-  const Eigen::SelfAdjointEigenSolver<Matrix9d> solver(normal);
-  const Vector9d& values = solver.eigenvalues();  // rising
-  if (solver.info() != Eigen::Success || !(values(1) > 1e-12 * values(8))) {
+  const std::optional<Vector9d> v = NullVector(normal);
+  if (!v) {
     return std::nullopt;
   }
-  const Vector9d v = solver.eigenvectors().col(0);
-  Eigen::Matrix3d m;
-  m << v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7), v(8);
-  return m;
+  return Eigen::Matrix3d(Eigen::Matrix3d::Map(v->data()).transpose());
+}
+
+// The larger eigenvalue of a symmetric 2x2 matrix, given by its lower triangle. It is tridiagonal as it is, which
+// spares Eigen's first step.
+double LargerEigenvalue(const Eigen::Matrix2d& matrix) {
+  const double largest = std::max({std::abs(matrix(0, 0)), std::abs(matrix(1, 0)), std::abs(matrix(1, 1))});
+  const double scale = largest > 0.0 ? largest : 1.0;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeFromTridiagonal(matrix.diagonal() / scale, matrix.diagonal<-1>() / scale, Eigen::EigenvaluesOnly);
+  return scale * solver.eigenvalues().maxCoeff();
 }
 
 // Two unit vectors that, with the unit vector v, form a right-handed orthonormal frame.
@@ -87,7 +92,7 @@ std::optional<Eigen::Matrix3d> EssentialFromPairs(std::span<const RayPair> pairs
     row << pair.second.x() * pair.first, pair.second.y() * pair.first, pair.first;
     normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
   }
-  const std::optional<Eigen::Matrix3d> raw = NullMatrix(normal.selfadjointView<Eigen::Lower>());
+  const std::optional<Eigen::Matrix3d> raw = NullMatrix(normal);
   if (!raw) {
     return std::nullopt;
   }
@@ -104,7 +109,7 @@ std::optional<Eigen::Matrix3d> HomographyFromPairs(std::span<const RayPair> pair
     row << Eigen::Vector3d::Zero(), pair.first, -pair.second.y() * pair.first;
     normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
   }
-  const std::optional<Eigen::Matrix3d> homography = NullMatrix(normal.selfadjointView<Eigen::Lower>());
+  const std::optional<Eigen::Matrix3d> homography = NullMatrix(normal);
   if (!homography || std::abs(homography->determinant()) < 1e-9) {
     return std::nullopt;
   }
@@ -189,12 +194,11 @@ RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_
 }
 
 double DirectionSigma(const RefinedMotion& motion, double sigma) {
-  const Eigen::Matrix<double, 5, 5> covariance = motion.information.inverse();
+  const Eigen::Matrix<double, 5, 5> covariance = InverseOf(motion.information);
   if (!covariance.allFinite()) {
     return std::numeric_limits<double>::infinity();
   }
-  const Eigen::Matrix2d of_direction = covariance.bottomRightCorner<2, 2>();
-  const double largest = of_direction.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff();
+  const double largest = LargerEigenvalue(covariance.bottomRightCorner<2, 2>());
   return largest > 0.0 ? sigma * std::sqrt(largest) : std::numeric_limits<double>::infinity();
 }
 

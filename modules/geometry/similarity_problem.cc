@@ -2,9 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <limits>
+
+#include "geometry/decompositions.h"
 
 namespace tessera {
 namespace {
@@ -170,7 +171,7 @@ void SimilarityProblem::Minimize(SimilarityEstimate& estimate) const {
 }
 
 double SimilarityProblem::RotationSigma(const SimilarityEstimate& estimate) const {
-  const Matrix7d covariance = Linearize(estimate).information.inverse();
+  const Matrix7d covariance = InverseOf(Linearize(estimate).information);
   if (!covariance.allFinite()) return kInfinity;
   const Eigen::Matrix3d of_rotation = covariance.block<3, 3>(3, 3);
   const Eigen::Vector3d variances =

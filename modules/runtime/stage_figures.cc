@@ -7,6 +7,7 @@
 #include <fstream>
 #include <numeric>
 
+#include "core/quantile.h"
 #include "core/version.h"
 
 namespace tessera {
@@ -39,12 +40,10 @@ StepStatistics StatisticsOf(std::vector<float> steps_ms) {
     return statistics;
   }
   std::sort(steps_ms.begin(), steps_ms.end());
-  const auto last = static_cast<double>(steps_ms.size() - 1);
-  const auto quantile = [&](double share) { return static_cast<double>(steps_ms[static_cast<size_t>(share * last)]); };
   statistics.mean_ms = std::accumulate(steps_ms.begin(), steps_ms.end(), 0.0) / static_cast<double>(steps_ms.size());
-  statistics.median_ms = quantile(0.5);
-  statistics.p95_ms = quantile(0.95);
-  statistics.p99_ms = quantile(0.99);
+  statistics.median_ms = Quantile(steps_ms, 0.5);
+  statistics.p95_ms = Quantile(steps_ms, 0.95);
+  statistics.p99_ms = Quantile(steps_ms, 0.99);
   statistics.max_ms = static_cast<double>(steps_ms.back());
   return statistics;
 }

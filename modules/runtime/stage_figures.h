@@ -11,7 +11,7 @@
 
 namespace tessera {
 
-// Statistics of step times; quantiles are the step at that rank, rounded down.
+// Statistics of step times; quantiles are those of core/quantile.h.
 StepStatistics StatisticsOf(std::vector<float> steps_ms);
 
 class StageFigures {

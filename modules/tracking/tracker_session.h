@@ -58,7 +58,8 @@ class TrackerSession {
   TrackerActions Advance();
 
   State state() const;
-  size_t num_waiting() const { return waiting_.size(); }  // frames
+  size_t num_waiting() const { return waiting_.size(); }    // frames
+  int64_t num_keyframes() const { return num_keyframes_; }  // sent
   // The question that was sent and is not answered yet, to be sent again from time to time: a loop closer that was
   // started again did not hear it. nullptr: none.
   const RelocalizationRequest* open_question() const { return time_->has_open_question() ? &question_ : nullptr; }
@@ -76,7 +77,7 @@ class TrackerSession {
   FrameId last_received_;
   FrameId last_tracked_;
   RelocalizationRequest question_;  // the last that was sent
-  int64_t num_keyframes_ = 0;       // sent
+  int64_t num_keyframes_ = 0;
   std::optional<EndOfStream> features_end_;
   bool awaits_snapshot_;
   bool fits_map_ = false;  // the camera and the keyframes that the map began with

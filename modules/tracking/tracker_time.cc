@@ -85,4 +85,10 @@ const RelocalizationAnswer* ReplayTime::TakeAnswer(FrameId frame) {
   return answer == recorded_.relocalizations.end() ? nullptr : &answer->second;
 }
 
+std::unique_ptr<TrackerTime> MakeTrackerTime(const TrackerTimeOptions& options, std::optional<RecordedSteps> recorded) {
+  if (recorded && recorded->is_live) return std::make_unique<ReplayTime>(std::move(*recorded));
+  if (options.is_live) return std::make_unique<LiveTime>(options.may_ask);
+  return std::make_unique<LogicalTime>(options.map_delay_frames, options.may_ask);
+}
+
 }  // namespace tessera

@@ -11,6 +11,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/ids.h"
@@ -131,5 +132,15 @@ class ReplayTime : public TrackerTime {
 
   const RecordedSteps recorded_;
 };
+
+struct TrackerTimeOptions {
+  bool is_live = false;
+  int64_t map_delay_frames = 1;  // D of LogicalTime
+  bool may_ask = true;           // frames may ask where they were taken
+};
+
+// The policy that the options ask for; of a run that is replayed, `recorded`, the one that repeats it: only a live one
+// needs its steps, logical time comes to the same ones again.
+std::unique_ptr<TrackerTime> MakeTrackerTime(const TrackerTimeOptions& options, std::optional<RecordedSteps> recorded);
 
 }  // namespace tessera

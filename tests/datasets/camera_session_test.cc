@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/errors.h"
@@ -44,20 +45,39 @@ class FakeSource : public FrameSource {
 };
 
 CameraSession Recorded(int64_t num_frames, int window = 3, int64_t damaged = -1) {
-  return {std::make_unique<FakeSource>(num_frames, false, damaged), {.lockstep_window = window}, 10, 0};
+  return {std::make_unique<FakeSource>(num_frames, false, damaged), {{.lockstep_window = window}, true, 10}, 0};
 }
 
-// Sends all that may go at time 0.
+// All values of one type among the actions.
+template <class Value>
+std::vector<Value> AllOf(const CameraActions& actions) {
+  std::vector<Value> values;
+  for (const CameraAction& action : actions) {
+    if (const auto* value = std::get_if<Value>(&action)) values.push_back(*value);
+  }
+  return values;
+}
+
+// Reads and sends all that may go at time 0.
+CameraActions AdvanceAll(CameraSession& session) {
+  CameraActions all;
+  for (State state = session.Look(0); state == State::kMustRead || state == State::kReady; state = session.Look(0)) {
+    for (CameraAction& action : session.Advance(0)) all.push_back(std::move(action));
+  }
+  return all;
+}
+
 std::vector<int64_t> SendAll(CameraSession& session) {
   std::vector<int64_t> frames;
-  for (State state = session.Look(0); state == State::kMustRead || state == State::kReady; state = session.Look(0)) {
-    if (state == State::kMustRead) {
-      session.Read();
-    } else {
-      frames.push_back(session.Send(0).frame.id.value);
-    }
-  }
+  for (const CameraFrame& frame : AllOf<CameraFrame>(AdvanceAll(session))) frames.push_back(frame.id.value);
   return frames;
+}
+
+// The end of the stream, which must be there.
+EndOfStream EndOf(const CameraActions& actions) {
+  const std::vector<EndOfStream> ends = AllOf<EndOfStream>(actions);
+  EXPECT_EQ(ends.size(), 1U);
+  return ends.empty() ? EndOfStream{} : ends.front();
 }
 
 using Frames = std::vector<int64_t>;
@@ -74,38 +94,47 @@ TEST(CameraSession, LockstepSendsAsFastAsPosesComeBack) {
   EXPECT_EQ(session.num_sent(), 5);
 }
 
-TEST(CameraSession, TruePosesGoWithTheirFrames) {
-  CameraSession session = Recorded(4, 10);
-  session.Read();
-  EXPECT_EQ(session.Send(0).truths.size(), 1U);
-  session.Read();
-  EXPECT_TRUE(session.Send(0).truths.empty());
-  session.Read();
-  EXPECT_EQ(session.Send(0).truths.front().frame, FrameId{2});
+TEST(CameraSession, TruePosesGoBeforeTheirFrames) {
+  CameraSession session = Recorded(3, 10);
+  const CameraActions actions = AdvanceAll(session);
+  ASSERT_EQ(actions.size(), 5U);
+  EXPECT_EQ(std::get<GroundTruthPose>(actions[0]).frame, FrameId{0});
+  EXPECT_EQ(std::get<CameraFrame>(actions[1]).id, FrameId{0});
+  EXPECT_EQ(std::get<CameraFrame>(actions[2]).id, FrameId{1}) << "has none";
+  EXPECT_EQ(std::get<GroundTruthPose>(actions[3]).frame, FrameId{2});
+  EXPECT_EQ(std::get<CameraFrame>(actions[4]).id, FrameId{2});
 }
 
 TEST(CameraSession, TheStreamEndsOnceBehindItsLastFrame) {
   CameraSession session = Recorded(3, 10);
   SendAll(session);
-  const auto ending = session.End();
-  ASSERT_TRUE(ending);
-  EXPECT_EQ(ending->end.stage, StageKind::kCamera);
-  EXPECT_EQ(ending->end.num_frames, 3);
-  EXPECT_FALSE(session.End());
+  const CameraActions actions = session.Advance(0);
+  EXPECT_EQ(EndOf(actions).stage, StageKind::kCamera);
+  EXPECT_EQ(EndOf(actions).num_frames, 3);
+  EXPECT_EQ(AllOf<Finish>(actions).size(), 1U);
   EXPECT_EQ(session.Look(0), State::kEnded);
+  EXPECT_TRUE(session.Advance(0).empty());
+  EXPECT_TRUE(session.End().empty());
 }
 
 TEST(CameraSession, ToldToStopItEndsWhereItIs) {
   CameraSession session = Recorded(9, 2);
   SendAll(session);
-  EXPECT_EQ(session.End()->end.num_frames, 2);
+  EXPECT_EQ(EndOf(session.End()).num_frames, 2);
 }
 
 TEST(CameraSession, ADamagedImageBreaksTheStreamOff) {
   CameraSession session = Recorded(9, 10, 2);
-  EXPECT_THROW(SendAll(session), InputError);
+  const std::vector<Fail> fails = AllOf<Fail>(AdvanceAll(session));
+  ASSERT_EQ(fails.size(), 1U);
+  EXPECT_TRUE(fails[0].is_user_error);
   EXPECT_EQ(session.Look(0), State::kEnded);
-  EXPECT_FALSE(session.End()) << "a stream that broke off has not ended";
+  EXPECT_TRUE(session.End().empty()) << "a stream that broke off has not ended";
+}
+
+TEST(CameraSession, WithoutFollowersNoPoseIsWaitedFor) {
+  CameraSession session(std::make_unique<FakeSource>(5, false, -1), {{.lockstep_window = 2}, false, 10}, 0);
+  EXPECT_EQ(SendAll(session).size(), 5U);
 }
 
 TEST(CameraSession, ARecordedSourceContinuesBehindWhatIsTracked) {
@@ -118,13 +147,13 @@ TEST(CameraSession, WhatIsTrackedToItsEndEndsThere) {
   CameraSession session = Recorded(5, 2);
   session.MarkTracked({4}, 4 * kFrameUs, 0);
   EXPECT_TRUE(SendAll(session).empty());
-  EXPECT_EQ(session.End()->end.num_frames, 5);
+  EXPECT_EQ(EndOf(session.End()).num_frames, 5);
 }
 
 TEST(CameraSession, ALiveSourceContinuesWithHigherNumbers) {
-  CameraSession session(std::make_unique<FakeSource>(3, true, -1), {.kind = PacerOptions::Kind::kFree}, 10, 0);
+  CameraSession session(std::make_unique<FakeSource>(3, true, -1), {{.lockstep_window = 2}, true, 10}, 0);
   session.MarkTracked({100}, 100 * kFrameUs, 0);
-  EXPECT_EQ(SendAll(session), (Frames{111, 112, 113})) << "behind all that may be on its way";
+  EXPECT_EQ(SendAll(session), (Frames{111, 112, 113})) << "at its own pace, behind all that may be on its way";
 }
 
 TEST(CameraSession, LockstepAsksForHelpWhenNoPoseComes) {

@@ -13,14 +13,14 @@ StageIdentity Identity() { return {.name = "mapper", .epoch_us = 5, .host = "her
 TEST(StageFigures, StatisticsAreOfAllSteps) {
   EXPECT_EQ(StatisticsOf({}).count, 0);
   std::vector<float> steps_ms;
-  for (int i = 100; i >= 1; --i) steps_ms.push_back(static_cast<float>(i));
+  for (int i = 101; i >= 1; --i) steps_ms.push_back(static_cast<float>(i));
   const StepStatistics statistics = StatisticsOf(steps_ms);
-  EXPECT_EQ(statistics.count, 100);
-  EXPECT_NEAR(statistics.mean_ms, 50.5, 1e-9);
-  EXPECT_EQ(statistics.median_ms, 50.0);
-  EXPECT_EQ(statistics.p95_ms, 95.0);
-  EXPECT_EQ(statistics.p99_ms, 99.0);
-  EXPECT_EQ(statistics.max_ms, 100.0);
+  EXPECT_EQ(statistics.count, 101);
+  EXPECT_NEAR(statistics.mean_ms, 51.0, 1e-9);
+  EXPECT_EQ(statistics.median_ms, 51.0);
+  EXPECT_DOUBLE_EQ(statistics.p95_ms, 96.0);
+  EXPECT_DOUBLE_EQ(statistics.p99_ms, 100.0);
+  EXPECT_EQ(statistics.max_ms, 101.0);
 }
 
 TEST(StageFigures, StatisticsAreComputedOnceASecondAndAtTheEnd) {

@@ -157,5 +157,23 @@ TEST(TrackerTime, NobodyMayAskWhereThatIsTurnedOff) {
   EXPECT_FALSE(LiveTime(false).MayAsk({7}));
 }
 
+TEST(MakeTrackerTime, IsLogicalUnlessAskedToBeLive) {
+  EXPECT_NE(dynamic_cast<LogicalTime*>(MakeTrackerTime({}, std::nullopt).get()), nullptr);
+  EXPECT_NE(dynamic_cast<LiveTime*>(MakeTrackerTime({.is_live = true}, std::nullopt).get()), nullptr);
+}
+
+TEST(MakeTrackerTime, ALiveRunIsRepeatedByItsSteps) {
+  RecordedSteps live;
+  live.is_live = true;
+  EXPECT_NE(dynamic_cast<ReplayTime*>(MakeTrackerTime({}, live).get()), nullptr);
+  EXPECT_NE(dynamic_cast<LogicalTime*>(MakeTrackerTime({}, RecordedSteps{}).get()), nullptr);
+}
+
+TEST(MakeTrackerTime, AsksOnlyIfItMay) {
+  EXPECT_TRUE(MakeTrackerTime({.may_ask = true}, std::nullopt)->MayAsk({0}));
+  EXPECT_FALSE(MakeTrackerTime({.may_ask = false}, std::nullopt)->MayAsk({0}));
+  EXPECT_FALSE(MakeTrackerTime({.is_live = true, .may_ask = false}, std::nullopt)->MayAsk({0}));
+}
+
 }  // namespace
 }  // namespace tessera

@@ -2,9 +2,8 @@
 
 #include <exception>
 #include <memory>
-#include <utility>
+#include <optional>
 
-#include "core/errors.h"
 #include "messages/tracking_types.h"
 #include "stages/camera/log_source.h"
 
@@ -27,35 +26,22 @@ std::unique_ptr<FrameSource> Open(const Settings& settings) {
                                             : OpenSource(options);
 }
 
-PacerOptions PacerOptionsFrom(const Settings& settings, bool is_live) {
+CameraSessionOptions OptionsFrom(const Settings& settings) {
   const auto camera = settings.Get<CameraSettings>();
-  PacerOptions options = ParsePace(camera.pace);
-  options.lockstep_window = camera.lockstep_window;
-  // Nothing answers from a log that is being written.
-  if (is_live || settings.Get<BusSettings>().main_url.starts_with("file:")) {
-    options.kind = PacerOptions::Kind::kFree;
-  }
-  return options;
-}
-
-// Frames that the dispatcher can have taken, beyond the last one tracked.
-int64_t NumOnTheWay(const Settings& settings) {
   const auto dispatcher = settings.Get<DispatcherSettings>();
-  return dispatcher.max_queued_frames + dispatcher.max_frames_in_flight;
-}
-
-CameraSession MakeSession(const StageContext& context) {
-  const Settings& settings = context.settings();
-  std::unique_ptr<FrameSource> source = Open(settings);
-  const PacerOptions pace = PacerOptionsFrom(settings, source->is_live());
-  return {std::move(source), pace, NumOnTheWay(settings), context.now_us()};
+  CameraSessionOptions options;
+  options.pace = ParsePace(camera.pace);
+  options.pace.lockstep_window = camera.lockstep_window;
+  options.is_followed = !settings.Get<BusSettings>().main_url.starts_with("file:");  // a log that is being written
+  options.num_on_the_way = dispatcher.max_queued_frames + dispatcher.max_frames_in_flight;
+  return options;
 }
 
 }  // namespace
 
 CameraStage::CameraStage(StageContext& context)
     : context_(context),
-      session_(MakeSession(context)),
+      session_(Open(context.settings()), OptionsFrom(context.settings()), context.now_us()),
       calibration_(context.Advertise(kCalibration)),
       ground_truth_(context.Advertise(kGroundTruth)),
       frames_(context.Advertise(kCamera)),
@@ -74,7 +60,7 @@ CameraStage::CameraStage(StageContext& context)
 
 CameraStage::~CameraStage() {
   try {
-    End();
+    Do(session_.End());
   } catch (const std::exception&) {
     // Nobody is left to tell; the dispatcher's own watch notices a stream without an end.
   }
@@ -82,47 +68,27 @@ CameraStage::~CameraStage() {
 
 // Returns whether to continue at once.
 bool CameraStage::Step() {
-  switch (session_.Look(context_.now_us())) {
-    case CameraSession::State::kMustRead:
-      return Read();
-    case CameraSession::State::kReady:
-      Send();
-      return true;
-    case CameraSession::State::kAtEnd:
-      End();
-      context_.Finish();
-      return false;
-    case CameraSession::State::kWaits:
-    case CameraSession::State::kEnded:
-      break;
-  }
-  return false;
-}
-
-bool CameraStage::Read() {
-  const StepTimer timer(context_);
-  try {
-    session_.Read();
-  } catch (const InputError& error) {
-    context_.Fail(error.what(), 2);
-    return false;
-  }
+  const CameraSession::State state = session_.Look(context_.now_us());
+  if (state == CameraSession::State::kWaits || state == CameraSession::State::kEnded) return false;
+  std::optional<StepTimer> timer;
+  if (state == CameraSession::State::kMustRead) timer.emplace(context_);  // the camera's own work is to decode images
+  const CameraActions actions = session_.Advance(context_.now_us());
+  timer.reset();
+  Do(actions);
   return true;
 }
 
-void CameraStage::Send() {
-  const CameraSession::Shipment shipment = session_.Send(context_.now_us());
-  for (const GroundTruthPose& truth : shipment.truths) ground_truth_.Publish(truth);
-  frames_.Publish(shipment.frame);
+void CameraStage::Do(const CameraActions& actions) {
+  const Overloaded perform{
+      [this](const GroundTruthPose& truth) { ground_truth_.Publish(truth); },
+      [this](const CameraFrame& frame) { frames_.Publish(frame); },
+      [this](const EndOfStream& end) { end_of_stream_.Publish(end); },
+      [this](const Fail& fail) { context_.Fail(fail.sentence, fail.is_user_error ? 2 : 1); },
+      [this](const Finish&) { context_.Finish(); },
+  };
+  for (const CameraAction& action : actions) std::visit(perform, action);
   context_.SetQueue(session_.num_ahead());
   context_.SetValue("num_sent", static_cast<double>(session_.num_sent()));
-}
-
-void CameraStage::End() {
-  const auto ending = session_.End();
-  if (!ending) return;
-  for (const GroundTruthPose& truth : ending->truths) ground_truth_.Publish(truth);
-  end_of_stream_.Publish(ending->end);
 }
 
 }  // namespace tessera

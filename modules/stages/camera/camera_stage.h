@@ -18,9 +18,7 @@ class CameraStage {
 
  private:
   bool Step();
-  bool Read();
-  void Send();
-  void End();
+  void Do(const CameraActions& actions);
 
   StageContext& context_;
   CameraSession session_;

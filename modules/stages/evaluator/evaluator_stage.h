@@ -1,11 +1,10 @@
-// Wiring of the evaluator: what the stages say goes into a RunRecord, which is written once the run has
-// ended (evaluation/run_end.h).
+// Wiring of the evaluator: what the stages say in, the files of the run out. What happens between them stands in
+// evaluation/evaluator_session.h.
 #pragma once
 
 #include <string>
 
-#include "evaluation/run_end.h"
-#include "evaluation/run_record.h"
+#include "evaluation/evaluator_session.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
 
@@ -21,16 +20,13 @@ class EvaluatorStage {
   EvaluatorStage& operator=(const EvaluatorStage&) = delete;
 
  private:
-  Result<> Apply(const MapDelta& delta);
   void FinishIfDone();
   void Write();
 
   StageContext& context_;
-  std::string out_dir_;
-  RunRecord record_;
-  RunEnd end_;
+  const std::string out_dir_;
+  EvaluatorSession session_;
   MapSubscription map_;
-  bool is_written_ = false;
 };
 
 }  // namespace tessera

@@ -1,38 +1,11 @@
 #include "stages/extractor/extractor_stage.h"
 
-#include <algorithm>
-#include <set>
-#include <sstream>
-
-#include "core/errors.h"
-#include "features/tiling.h"
-
 namespace tessera {
 namespace {
 
-// A robot that gave no job for so long has no share of the extractor now.
-constexpr int64_t kRecentUs = 2'000'000;
-
 // extractor.robots: the prefixes of the robots that are served besides the one of this process's own prefix.
 std::vector<std::string> OtherRobots(const Settings& settings) {
-  const auto text = settings.Get<ExtractorSettings>().robots;
-  std::set<std::string> known{settings.Get<BusSettings>().channel_prefix};
-  std::vector<std::string> robots;
-  std::istringstream words(text);
-  for (std::string prefix; std::getline(words, prefix, ',');) {
-    if (prefix.empty() || !known.insert(prefix).second) {
-      throw InputError(
-          "setting extractor.robots = `" + text +
-          "` must be channel prefixes with commas between them, such as a_,b_: none empty, none twice, and "
-          "not bus.channel_prefix, whose robot is served anyway");
-    }
-    robots.push_back(prefix);
-  }
-  if (robots.size() >= static_cast<size_t>(kMaxRobots)) {
-    throw InputError("setting extractor.robots names " + std::to_string(robots.size()) +
-                     " robots; an extractor serves " + std::to_string(kMaxRobots) + " at most");
-  }
-  return robots;
+  return ParseRobots(settings.Get<ExtractorSettings>().robots, settings.Get<BusSettings>().channel_prefix);
 }
 
 }  // namespace
@@ -40,8 +13,7 @@ std::vector<std::string> OtherRobots(const Settings& settings) {
 ExtractorStage::ExtractorStage(StageContext& context) : ExtractorStage(context, OtherRobots(context.settings())) {}
 
 ExtractorStage::ExtractorStage(StageContext& context, const std::vector<std::string>& other_robots)
-    : context_(context), queue_(1 + other_robots.size()) {
-  began_us_ = context.now_us();
+    : context_(context), session_(1 + other_robots.size()), began_us_(context.now_us()) {
   robots_.push_back({.context = &context, .prefix = context.settings().Get<BusSettings>().channel_prefix});
   Serve(0);
   for (const std::string& prefix : other_robots) {
@@ -72,29 +44,17 @@ void ExtractorStage::Serve(size_t robot) {
 }
 
 void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
-  Robot& owner = robots_[robot];
-  Result<> accepted = CheckTileJob(job);
-  if (accepted) {
-    if (job.run != owner.run) {
-      // The robot's stack was started again: nobody waits for what its predecessor wanted.
-      queue_.Drop(robot);
-      owner.features.Forget();
-      owner.run = job.run;
-    }
-    owner.job_came_us = context_.now_us();
-    if (!queue_.Push(robot, WorkOf(job), job)) accepted = Failed("too many jobs of this robot wait already");
-  }
-  if (!accepted) {
-    owner.context->ReportError("job for frame " + std::to_string(job.frame.value) + ", tile " +
-                               std::to_string(job.tile) + " is refused: " + accepted.error().sentence);
-  }
-  owner.context->SetQueue(static_cast<int64_t>(queue_.num_waiting(robot)));
-  if (!is_pool()) DoNextJob();  // nobody to be fair to: as it comes
+  const Robot& owner = robots_[robot];
+  const auto taken = session_.Receive(robot, job, context_.now_us());
+  if (!taken) owner.context->ReportError(taken.error().sentence);
+  if (taken && *taken == ExtractorSession::Taken::kOfNewRun) owner.features.Forget();
+  owner.context->SetQueue(static_cast<int64_t>(session_.num_waiting(robot)));
+  if (!session_.is_pool()) DoNextJob();  // nobody to be fair to: as it comes
 }
 
 void ExtractorStage::OnEnd(size_t robot, const EndOfStream& end) {
   if (end.stage != StageKind::kDispatcher) return;
-  if (is_pool()) {
+  if (session_.is_pool()) {
     robots_[robot].features.Forget();  // all its answers have arrived
   } else {
     context_.Finish();
@@ -102,32 +62,24 @@ void ExtractorStage::OnEnd(size_t robot, const EndOfStream& end) {
 }
 
 bool ExtractorStage::DoNextJob() {
-  if (queue_.empty()) return false;
-  const FairQueue::Turn turn = queue_.Pop();
-  Robot& robot = robots_[turn.robot];
+  if (!session_.has_jobs()) return false;
+  const FairQueue::Turn turn = session_.TakeNext();
+  const Robot& robot = robots_[turn.robot];
   TileFeatures features;
   {
     const StepTimer timer(*robot.context);
-    features = extractor_.Extract(turn.job);
+    features = session_.Do(turn);
   }
   robot.features.Publish(features);
-  ++num_jobs_done_;
-  robot.work_done += turn.work;
-  robot.context->SetQueue(static_cast<int64_t>(queue_.num_waiting(turn.robot)));
-  context_.SetValue("work_" + robot.prefix, static_cast<double>(robot.work_done));
-  return !queue_.empty();
+  robot.context->SetQueue(static_cast<int64_t>(session_.num_waiting(turn.robot)));
+  context_.SetValue("work_" + robot.prefix, static_cast<double>(session_.work_done(turn.robot)));
+  return session_.has_jobs();
 }
 
 void ExtractorStage::SayReady() {
-  const auto num_robots = std::count_if(robots_.begin(), robots_.end(), [&](const Robot& robot) {
-    return context_.now_us() - robot.job_came_us < kRecentUs;
-  });
+  const ExtractorReady ready = session_.Ready(context_.id(), context_.epoch_us(), context_.now_us());
   for (const Robot& robot : robots_) {
-    if (!robot.is_served) continue;
-    robot.ready.Publish({.extractor = context_.id(),
-                         .epoch_us = context_.epoch_us(),
-                         .num_jobs_done = num_jobs_done_,
-                         .num_robots = std::max(1, static_cast<int32_t>(num_robots))});
+    if (robot.is_served) robot.ready.Publish(ready);
   }
 }
 

@@ -1,12 +1,12 @@
-// Wiring of an extractor: jobs in, their candidates out, for one robot or for several in turn.
+// Wiring of an extractor: jobs in, their candidates out, for one robot or for several in turn. Which jobs are taken
+// stands in distribution/extractor_session.h.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "distribution/fair_queue.h"
-#include "features/extractor.h"
+#include "distribution/extractor_session.h"
 #include "messages/end_of_stream.h"
 #include "runtime/stage.h"
 
@@ -23,14 +23,9 @@ class ExtractorStage {
     bool is_served = false;  // advertised and subscribed
     Publisher<TileFeatures> features;
     Publisher<ExtractorReady> ready;
-    int64_t run = 0;                      // whose jobs are done
-    int64_t job_came_us = INT64_MIN / 2;  // the last one
-    int64_t work_done = 0;                // as WorkOf
   };
 
   ExtractorStage(StageContext& context, const std::vector<std::string>& other_robots);
-  // Serves robots that come and go.
-  bool is_pool() const { return robots_.size() > 1; }
   void Serve(size_t robot);
   // Begins to serve those robots of which it is known that no other process has this one's name there.
   void ServeOthers();
@@ -42,10 +37,8 @@ class ExtractorStage {
 
   StageContext& context_;
   std::vector<Robot> robots_;
-  FairQueue queue_;
-  Extractor extractor_;
+  ExtractorSession session_;
   int64_t began_us_ = 0;
-  int64_t num_jobs_done_ = 0;
 };
 
 }  // namespace tessera

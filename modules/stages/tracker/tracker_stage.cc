@@ -1,8 +1,7 @@
 #include "stages/tracker/tracker_stage.h"
 
 #include <cmath>
-#include <memory>
-#include <string>
+#include <optional>
 #include <utility>
 
 #include "wire/recorded_steps.h"
@@ -25,18 +24,14 @@ MapTrackerOptions OptionsFrom(const TrackerSettings& settings) {
   return options;
 }
 
-std::unique_ptr<TrackerTime> TimeFrom(const TrackerSettings& settings, const std::string& channel_prefix) {
-  if (!settings.replay_log.empty()) {
-    RecordedSteps recorded = ReadRecordedSteps(settings.replay_log, channel_prefix);
-    if (recorded.is_live) return std::make_unique<ReplayTime>(std::move(recorded));
-  }
-  if (settings.live) return std::make_unique<LiveTime>(settings.relocalize);
-  return std::make_unique<LogicalTime>(settings.map_delay_frames, settings.relocalize);
-}
-
 TrackerSession MakeSession(const Settings& settings) {
   const auto tracker = settings.Get<TrackerSettings>();
-  return {OptionsFrom(tracker), TimeFrom(tracker, settings.Get<BusSettings>().channel_prefix), BeginsWithMap(settings)};
+  std::optional<RecordedSteps> recorded;
+  if (!tracker.replay_log.empty()) {
+    recorded = ReadRecordedSteps(tracker.replay_log, settings.Get<BusSettings>().channel_prefix);
+  }
+  const TrackerTimeOptions time{tracker.live, tracker.map_delay_frames, tracker.relocalize};
+  return {OptionsFrom(tracker), MakeTrackerTime(time, std::move(recorded)), BeginsWithMap(settings)};
 }
 
 }  // namespace
@@ -51,63 +46,58 @@ TrackerStage::TrackerStage(StageContext& context)
   keyframes_ = context.Advertise(kKeyframe);
   end_of_stream_ = context.Advertise(kEndOfStream);
   requests_ = context.Advertise(kRelocalizationRequest);
-  context.Subscribe(kRelocalization, [this](const RelocalizationAnswer& answer) {
-    session_.Receive(answer);
-    Advance();
-  });
-  context.Subscribe(kFeatures, [this](const FeatureFrame& features) {
-    session_.Receive(features);
-    Advance();
-  });
+  Receive(kRelocalization);
+  Receive(kFeatures);
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
-    if (end.stage == StageKind::kReassembler) Do(session_.Receive(end));
+    if (end.stage == StageKind::kReassembler) Do(session_.Receive(end), context_.now_us());
   });
   context.Every(kAskAgain, [this] {
     if (const auto* question = session_.open_question()) requests_.Publish(*question);
   });
 }
 
-// Tracks what can be tracked, and measures how long the first frame waits for what it must see.
+template <class Value>
+void TrackerStage::Receive(const Topic<Value>& topic) {
+  context_.Subscribe(topic, [this](const Value& value) {
+    session_.Receive(value);
+    Advance();
+  });
+}
+
 void TrackerStage::Advance() {
   while (session_.state() == TrackerSession::State::kReady) {
+    const int64_t began_us = context_.now_us();
     TrackerActions actions;
-    const int64_t now_us = context_.now_us();
     {
       const StepTimer timer(context_);
       actions = session_.Advance();
     }
-    for (TrackerAction& action : actions) {
-      if (auto* pose = std::get_if<PoseEstimate>(&action)) {
-        pose->map_wait_us = now_us - std::exchange(waits_since_us_, std::nullopt).value_or(now_us);
-      }
-    }
-    Do(actions);
+    Do(std::move(actions), began_us);
   }
-  if (session_.num_waiting() > 0 && !waits_since_us_) waits_since_us_ = context_.now_us();
+  if (session_.num_waiting() > 0) wait_.Begin(context_.now_us());
   context_.SetQueue(static_cast<int64_t>(session_.num_waiting()));
 }
 
-void TrackerStage::Do(const TrackerActions& actions) {
+// `began_us`: when the step began.
+void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
   const Overloaded perform{
-      [this](const PoseEstimate& pose) { Publish(pose); },
-      [this](const KeyframeObservation& keyframe) {
-        keyframes_.Publish(keyframe);
-        context_.SetValue("keyframes_sent", static_cast<double>(++num_keyframes_));
-      },
+      [this, began_us](PoseEstimate& pose) { Publish(std::move(pose), began_us); },
+      [this](const KeyframeObservation& keyframe) { keyframes_.Publish(keyframe); },
       [this](const RelocalizationRequest& request) { requests_.Publish(request); },
       [this](const EndOfStream& end) { end_of_stream_.Publish(end); },
       [this](const RejectMap& reject) { map_.Reject(reject.reason); },
       [this](const Fail& fail) { context_.Fail(fail.sentence, fail.is_user_error ? 2 : 1); },
       [this](const Finish&) { context_.Finish(); },
   };
-  for (const TrackerAction& action : actions) std::visit(perform, action);
+  for (TrackerAction& action : actions) std::visit(perform, action);
+  context_.SetValue("keyframes_sent", static_cast<double>(session_.num_keyframes()));
 }
 
-void TrackerStage::Publish(const PoseEstimate& pose) {
+void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {
+  pose.map_wait_us = wait_.End(began_us);
   poses_.Publish(pose);
-  total_wait_us_ += pose.map_wait_us;
   context_.SetValue("state", static_cast<double>(pose.state));
-  context_.SetValue("map_wait_s", 1e-6 * static_cast<double>(total_wait_us_));
+  context_.SetValue("map_wait_s", 1e-6 * static_cast<double>(wait_.total_us()));
 }
 
 }  // namespace tessera

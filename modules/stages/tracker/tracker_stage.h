@@ -2,11 +2,10 @@
 // between them stands in tracking/tracker_session.h.
 #pragma once
 
-#include <optional>
-
 #include "messages/end_of_stream.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
+#include "tracking/map_wait.h"
 #include "tracking/tracker_session.h"
 
 namespace tessera {
@@ -17,9 +16,11 @@ class TrackerStage {
   explicit TrackerStage(StageContext& context);
 
  private:
+  template <class Value>
+  void Receive(const Topic<Value>& topic);
   void Advance();
-  void Do(const TrackerActions& actions);
-  void Publish(const PoseEstimate& pose);
+  void Do(TrackerActions actions, int64_t began_us);
+  void Publish(PoseEstimate pose, int64_t began_us);
 
   StageContext& context_;
   TrackerSession session_;
@@ -28,9 +29,7 @@ class TrackerStage {
   Publisher<KeyframeObservation> keyframes_;
   Publisher<RelocalizationRequest> requests_;
   Publisher<EndOfStream> end_of_stream_;
-  std::optional<int64_t> waits_since_us_;  // the first frame could be tracked, but for what it waits for
-  int64_t total_wait_us_ = 0;
-  int64_t num_keyframes_ = 0;
+  MapWait wait_;
 };
 
 }  // namespace tessera

@@ -1,0 +1,20 @@
+// The one definition of a quantile.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace tessera {
+
+// Quantile q, 0 to 1, of n > 0 values in rising order: the value at index (n - 1) q, interpolated linearly.
+template <class Number>
+double Quantile(const std::vector<Number>& sorted, double q) {
+  const double position = q * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<size_t>(position);
+  const size_t above = std::min(below + 1, sorted.size() - 1);
+  const double fraction = position - static_cast<double>(below);
+  return (1.0 - fraction) * static_cast<double>(sorted[below]) + fraction * static_cast<double>(sorted[above]);
+}
+
+}  // namespace tessera

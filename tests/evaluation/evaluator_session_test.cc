@@ -1,0 +1,102 @@
+#include "evaluation/evaluator_session.h"
+
+#include <gtest/gtest.h>
+
+#include "support/map_changes.h"
+#include "support/matchers.h"
+
+namespace tessera {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+
+// A run of two frames and one delta.
+struct Evaluator {
+  void SendPoses() {
+    for (int64_t frame = 0; frame < 2; ++frame) {
+      session.Receive(PoseEstimate{.frame = {frame}, .state = TrackingState::kTracked}, 7, kSecond);
+    }
+  }
+  void SendMap() {
+    EXPECT_THAT(session.Receive(WithHash(Map(), {.new_keyframes = {{{0}, {}, {}, PlainFeatures(0, 3)}}})), IsSuccess());
+    session.NoteMap(false, kSecond);
+    session.Receive(RemovedInDelta{.delta = 0});
+  }
+  void SendEnds() {
+    session.Receive(EndOfStream{.stage = StageKind::kTracker, .num_frames = 2, .num_dropped = 1}, kSecond);
+    session.Receive(EndOfStream{.stage = StageKind::kMapper, .num_values = 1}, kSecond);
+  }
+
+  EvaluatorSession session{"evaluator"};
+};
+
+TEST(EvaluatorSession, WritesOnceWhenAllIsThere) {
+  Evaluator evaluator;
+  evaluator.SendPoses();
+  evaluator.SendEnds();
+  EXPECT_FALSE(evaluator.session.MustWrite(kSecond)) << "the map is missing";
+  evaluator.SendMap();
+  ASSERT_TRUE(evaluator.session.MustWrite(kSecond));
+  const RunRecord& record = evaluator.session.TakeRecord();
+  EXPECT_EQ(record.Counts().tracked, 2);
+  EXPECT_EQ(record.Counts().dropped, 1);
+  EXPECT_EQ(record.Keyframes().size(), 1U);
+  EXPECT_FALSE(evaluator.session.MustWrite(kSecond));
+  EXPECT_FALSE(evaluator.session.MayWrite());
+}
+
+TEST(EvaluatorSession, AReplicaThatHasToBeReplacedIsWaitedFor) {
+  Evaluator evaluator;
+  evaluator.SendPoses();
+  evaluator.SendMap();
+  evaluator.SendEnds();
+  evaluator.session.NoteMap(true, kSecond);
+  EXPECT_FALSE(evaluator.session.MustWrite(kSecond));
+  evaluator.session.NoteMap(false, kSecond);
+  EXPECT_TRUE(evaluator.session.MustWrite(kSecond));
+}
+
+TEST(EvaluatorSession, ToldToStopItWritesWhatThereIs) {
+  Evaluator evaluator;
+  EXPECT_FALSE(evaluator.session.MayWrite()) << "the run never began";
+  evaluator.SendPoses();
+  EXPECT_TRUE(evaluator.session.MayWrite());
+
+  Evaluator without_poses;
+  without_poses.SendEnds();
+  EXPECT_TRUE(without_poses.session.MayWrite());
+}
+
+TEST(EvaluatorSession, ADeltaThatDoesNotFitIsRefused) {
+  Evaluator evaluator;
+  MapDelta delta = WithHash(Map(), {.new_keyframes = {{{0}, {}, {}, PlainFeatures(0, 3)}}});
+  delta.number = 5;
+  EXPECT_THAT(evaluator.session.Receive(delta), IsFailure(testing::_));
+}
+
+TEST(EvaluatorSession, RecordsTheLatestFiguresOfEachStage) {
+  Evaluator evaluator;
+  evaluator.session.Receive(StageStatus{.name = "mapper", .num_lost = 1}, 0);
+  evaluator.session.Receive(
+      StageStatus{.name = "mapper",
+                  .num_dropped = 2,
+                  .num_repaired = 3,
+                  .num_lost = 4,
+                  .step = {.count = 5, .mean_ms = 1, .median_ms = 2, .p95_ms = 3, .p99_ms = 4, .max_ms = 6},
+                  .values = {{"keyframes", 7}}},
+      1);
+  const std::map<std::string, StageRecord>& stages = evaluator.session.TakeRecord().stages();
+  ASSERT_EQ(stages.size(), 1U);
+  const StageRecord& mapper = stages.at("mapper");
+  EXPECT_EQ(mapper.num_dropped, 2);
+  EXPECT_EQ(mapper.num_repaired, 3);
+  EXPECT_EQ(mapper.num_lost, 4);
+  EXPECT_EQ(mapper.step_ms.count, 5);
+  EXPECT_EQ(mapper.step_ms.median, 2);
+  EXPECT_EQ(mapper.step_ms.p95, 3);
+  EXPECT_EQ(mapper.step_ms.max, 6);
+  EXPECT_EQ(mapper.values.at("keyframes"), 7);
+}
+
+}  // namespace
+}  // namespace tessera
