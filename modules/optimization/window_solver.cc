@@ -15,6 +15,7 @@ constexpr double kMinRadius = 1e-32;
 constexpr double kMinDiagonal = 1e-6;  // of J'J where damping is scaled by it
 constexpr double kMinRelativeDecrease = 1e-3;
 constexpr double kMinModelDecrease = 1e-14;  // of the cost; below it rounding decides
+constexpr double kMinInverseRatio = 0.1;     // a step moves a point to ten times its distance at most
 
 double LossBehind(bool has_right, int num_rows) {
   return HuberLoss(num_rows * kBehindResidual * kBehindResidual, Chi2Limit(has_right));
@@ -195,7 +196,7 @@ void WindowSolver::Reduce(double radius) {
     const size_t begin = terms_of_point_[point], end = terms_of_point_[point + 1];
     if (begin == end) continue;
     Eigen::Matrix3d damped = v_[point];
-    damped.diagonal() += Damping<Eigen::Vector3d>(v_[point].diagonal(), radius);
+    damped += PointDamping(point, radius);
     v_inverse_[point] = damped.inverse();
     for (size_t k = begin; k < end; ++k) {
       const int row = terms_[k].free_pose;
@@ -240,10 +241,34 @@ std::optional<WindowSolver::Step> WindowSolver::SolveStep(double radius) {
   for (size_t i = 0; i < v_.size(); ++i) {
     if (terms_of_point_[i] == terms_of_point_[i + 1]) continue;
     step.points[i] = BackSubstitute(i, step.poses);
-    const Eigen::Vector3d damping = Damping<Eigen::Vector3d>(v_[i].diagonal(), radius);
-    step.model_decrease += 0.5 * step.points[i].dot(damping.cwiseProduct(step.points[i]) - g_point_[i]);
+    step.model_decrease += 0.5 * step.points[i].dot(PointDamping(i, radius) * step.points[i] - g_point_[i]);
   }
   return step;
+}
+
+// From the center of the first camera that sees it.
+Eigen::Vector3d WindowSolver::RayTo(size_t point) const {
+  const size_t pose = terms_[terms_of_point_[point]].pose;
+  return state_.positions[point] + state_.rotations[pose].transpose() * state_.poses[pose].translation;
+}
+
+// Along the ray and aside of it, since a far point is known a thousand times better aside: damping by the world's axes
+// would hold its depth as firmly as its direction.
+Eigen::Matrix3d WindowSolver::PointDamping(size_t point, double radius) const {
+  const Eigen::Vector3d ray = RayTo(point).normalized();
+  const double along = ray.dot(v_[point] * ray), aside = 0.5 * (v_[point].trace() - along);
+  Eigen::Matrix3d damping = (std::max(along, kMinDiagonal) - aside) / radius * (ray * ray.transpose());
+  damping.diagonal().array() += aside / radius;
+  return damping;
+}
+
+// Linear in direction and inverse depth: with d the part of the step along the ray (as a share of it) and a the rest,
+//   center + ray  ->  center + (ray + a) / (1 - d)
+Eigen::Vector3d WindowSolver::MovedPoint(size_t point, const Eigen::Vector3d& step) const {
+  const Eigen::Vector3d ray = RayTo(point);
+  const double along = ray.dot(step) / ray.squaredNorm();
+  const Eigen::Vector3d aside = step - along * ray;
+  return state_.positions[point] - ray + (ray + aside) / std::max(kMinInverseRatio, 1.0 - along);
 }
 
 // d_p = -(V + D_p)^-1 (g_p + W' d_c)
@@ -265,7 +290,9 @@ WindowSolver::State WindowSolver::Moved(const Step& step) const {
     pose = MoveBy(pose, step.poses[i]);
     moved.rotations[pose_of_free_[i]] = pose.rotation.toRotationMatrix();
   }
-  for (size_t i = 0; i < step.points.size(); ++i) moved.positions[i] += step.points[i];
+  for (size_t i = 0; i < step.points.size(); ++i) {
+    if (terms_of_point_[i] < terms_of_point_[i + 1]) moved.positions[i] = MovedPoint(i, step.points[i]);
+  }
   return moved;
 }
 

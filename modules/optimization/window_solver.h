@@ -1,11 +1,14 @@
-// The bundle of a local window by Levenberg-Marquardt with a dense Schur complement, in fixed-size blocks. Its
-// steps are those of Ceres (BundleSolver, DENSE_SCHUR) up to rounding, in a fraction of the time (README.md).
+// The bundle of a local window by Levenberg-Marquardt with a dense Schur complement, in fixed-size blocks. It ends at
+// the minimum that Ceres finds (BundleSolver), in a fraction of the time (README.md).
 // Only this module's sources include this file.
 //
 // With J the derivatives of all whitened residuals by the poses (c) and the points (p), a step solves
 //
 //   | U + D_c   W       | |d_c|     |g_c|      U = J_c' J_c,  V = J_p' J_p,  W = J_c' J_p,  g = J' r
 //   | W'        V + D_p | |d_p| = - |g_p|      D = diag(J' J) / radius
+//
+// (the damping of points is turned into the direction of their ray, and they move by inverse depth along it: J. Civera,
+// A. Davison, J. M. M. Montiel, "Inverse Depth Parametrization for Monocular SLAM", T-RO 2008)
 //
 // by the reduced system (U + D_c - W (V + D_p)^-1 W') d_c = -(g_c - W (V + D_p)^-1 g_p); V is block diagonal, 3 x 3.
 #pragma once
@@ -57,6 +60,9 @@ class WindowSolver {
   void LinearizeConstraints();
   void Reduce(double radius);
   std::optional<Step> SolveStep(double radius);
+  Eigen::Vector3d RayTo(size_t point) const;
+  Eigen::Matrix3d PointDamping(size_t point, double radius) const;
+  Eigen::Vector3d MovedPoint(size_t point, const Eigen::Vector3d& step) const;
   Eigen::Vector3d BackSubstitute(size_t point, const std::vector<Vector6d>& poses) const;
   State Moved(const Step& step) const;
   Matrix6d& ReducedBlock(int row, int column) { return reduced_[static_cast<size_t>(row * (row + 1) / 2 + column)]; }
