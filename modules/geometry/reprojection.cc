@@ -9,8 +9,13 @@ Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, doubl
   const double v = calibration.fy_px * point_in_camera.y() * inverse_z + calibration.cy_px;
   const double disparity = calibration.fx_px * baseline_m * inverse_z;
   const double weight = 1.0 / observation.sigma_px;
-  return {weight * (u - observation.pixel_px.x()), weight * (v - observation.pixel_px.y()),
-          observation.has_right() ? weight * (u - disparity - observation.right_x_px) : 0.0};
+  double third = 0.0;
+  if (observation.disparity_sigma_px > 0.0) {
+    third = (observation.pixel_px.x() - disparity - observation.right_x_px) / observation.disparity_sigma_px;
+  } else if (observation.has_right()) {
+    third = weight * (u - disparity - observation.right_x_px);
+  }
+  return {weight * (u - observation.pixel_px.x()), weight * (v - observation.pixel_px.y()), third};
 }
 
 Reprojection Reproject(const CameraCalibration& calibration, double baseline_m, const Eigen::Vector3d& point_in_camera,
@@ -25,7 +30,10 @@ Reprojection Reproject(const CameraCalibration& calibration, double baseline_m, 
   const double fy = calibration.fy_px * inverse_z / observation.sigma_px;
   result.by_point.row(0) << fx, 0.0, -fx * x;
   result.by_point.row(1) << 0.0, fy, -fy * y;
-  if (observation.has_right()) {
+  if (observation.disparity_sigma_px > 0.0) {
+    const double per_z = calibration.fx_px * inverse_z / observation.disparity_sigma_px;
+    result.by_point.row(2) << 0.0, 0.0, per_z * baseline_m * inverse_z;
+  } else if (observation.has_right()) {
     result.by_point.row(2) << fx, 0.0, -fx * (x - baseline_m * inverse_z);
   }
   return result;

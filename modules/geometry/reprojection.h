@@ -21,6 +21,9 @@ struct PixelObservation {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
   double right_x_px = kNoColumn;  // column in the right image, may lie outside of it; kNoColumn: not known
   double sigma_px = 1.0;          // standard deviation of each coordinate
+  // > 0: a depth sensor measured the disparity by itself, with this standard deviation; else the right column was found
+  // in an image, as exactly as the left one.
+  double disparity_sigma_px = 0.0;
 
   bool has_right() const { return !std::isnan(right_x_px); }
 };

@@ -23,6 +23,7 @@ PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint) {
     seen.right_x_px = k.right_x_px >= 0.0F && k.right_x_px < k.x_px ? k.right_x_px : kNoColumn;
   } else if (features.calibration.sensor == SensorType::kRgbd && k.depth_m > 0.0F) {
     seen.right_x_px = k.x_px - features.calibration.fx_px * kRgbdBaseline / k.depth_m;
+    seen.disparity_sigma_px = kRgbdDisparitySigmaPx;
   }
   return seen;
 }

@@ -15,6 +15,10 @@ namespace tessera {
 // A structured-light camera measures depth as a disparity over the distance of projector and camera: 75 mm in those in
 // use (Kinect, Xtion).
 inline constexpr double kRgbdBaseline = 0.075;
+// How exactly, in pixels of the color image, at corners: the sensor's own disparities come in steps of 1/8 px with a
+// noise of about half a step (K. Khoshelham, S. Elberink, "Accuracy and Resolution of Kinect Depth Data", Sensors
+// 2012); the rest is how far the two images are from showing a corner at the same pixel.
+inline constexpr double kRgbdDisparitySigmaPx = 0.2;
 // Baseline that turns depths into right columns, meters: the pair's, or that virtual one; 0 for mono.
 double Baseline(const CameraCalibration& calibration);
 
