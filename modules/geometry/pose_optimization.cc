@@ -1,7 +1,10 @@
 #include "geometry/pose_optimization.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace tessera {
 namespace {
@@ -11,98 +14,174 @@ constexpr int kMinInliers = 3;  // points that fix six degrees of freedom
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
+// A nearer point than a fifth of its estimated distance is out of reach of a depth correction.
+constexpr double kMinInverseRatio = 0.2;
+
 struct NormalEquations {
   Matrix6d information = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
 };
 
+// The linearized residual of one observation: by the pose's left perturbation and by u.
+struct LinearTerm {
+  Reprojection reprojection;
+  Eigen::Matrix<double, 3, 6> by_pose;
+  Eigen::Vector3d by_depth;
+};
+
 class PoseProblem {
  public:
-  PoseProblem(const CameraCalibration& calibration, double baseline_m, std::span<const PoseObservation> observations)
-      : calibration_(calibration),
+  PoseProblem(const CameraCalibration& calibration, double baseline_m, std::span<const PoseObservation> observations,
+              const Rigid3& camera_from_world, const PosePrior* prior)
+      : prior_(prior),
+        calibration_(calibration),
         baseline_m_(baseline_m),
         observations_(observations),
-        is_inlier_(observations.size(), 1) {}
+        is_inlier_(observations.size(), 1),
+        depths_(observations.size()) {
+    const Eigen::Vector3d camera_in_world = camera_from_world.Inverse().translation;
+    for (size_t i = 0; i < depths_.size(); ++i) {
+      const PoseObservation& o = observations[i];
+      depths_[i].relative_sigma = o.depth_sigma_in_world.norm() / (o.point_in_world - camera_in_world).norm();
+    }
+  }
 
-  // Sorts into inliers and outliers; returns how many inliers.
+  // One Gauss-Newton step of the pose with all depths eliminated; they are moved along. nullopt if it isn't finite.
+  std::optional<Vector6d> Step(const Rigid3& camera_from_world, Matrix6d* information);
+  // Sorts into inliers and outliers, each at the depth that suits it best; returns how many inliers.
   int Classify(const Rigid3& camera_from_world);
-  NormalEquations Linearize(const Rigid3& camera_from_world, bool robust) const;
 
   std::vector<char>& is_inlier() { return is_inlier_; }
   double rms() const { return rms_; }
 
  private:
+  struct Depth {
+    double relative_sigma = 0.0;  // of the inverse depth
+    double u = 0.0;
+  };
+  // Of one observation that takes part in a step: what gives u from the step of the pose.
+  struct Eliminated {
+    size_t observation;
+    Vector6d coupling;
+    double curvature;
+    double gradient;
+  };
+
+  // point_i(u) - point_i, as a multiple of depth_sigma_i.
+  static double Shift(const Depth& depth) { return depth.u / (1.0 + depth.u * depth.relative_sigma); }
+  Eigen::Vector3d InCamera(const Eigen::Matrix3d& rotation, const Rigid3& camera_from_world, size_t i) const {
+    const PoseObservation& o = observations_[i];
+    return rotation * (o.point_in_world + Shift(depths_[i]) * o.depth_sigma_in_world) + camera_from_world.translation;
+  }
+  LinearTerm Linearize(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& point_in_camera, size_t i) const;
+  void MoveDepth(size_t i, double step);
+
+  const PosePrior* prior_;  // nullptr: none
   const CameraCalibration& calibration_;
   double baseline_m_;
   std::span<const PoseObservation> observations_;
   std::vector<char> is_inlier_;
+  std::vector<Depth> depths_;
+  std::vector<Eliminated> eliminated_;
   double rms_ = 0.0;
 };
+
+// d(point)/d(delta) = [I, -[point]x] for Retract's left perturbation;  d(point)/du = R depth_sigma / (1 + u s)^2.
+LinearTerm PoseProblem::Linearize(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& point_in_camera,
+                                  size_t i) const {
+  const PoseObservation& o = observations_[i];
+  LinearTerm term;
+  term.reprojection = Reproject(calibration_, baseline_m_, point_in_camera, o.seen);
+  term.by_pose << term.reprojection.by_point, -term.reprojection.by_point * Skew(point_in_camera);
+  const double stretch = 1.0 + depths_[i].u * depths_[i].relative_sigma;
+  term.by_depth = term.reprojection.by_point * (rotation * o.depth_sigma_in_world) / (stretch * stretch);
+  return term;
+}
+
+void PoseProblem::MoveDepth(size_t i, double step) {
+  Depth& depth = depths_[i];
+  if (depth.relative_sigma > 0.0) depth.u = std::max(depth.u + step, (kMinInverseRatio - 1.0) / depth.relative_sigma);
+}
+
+std::optional<Vector6d> PoseProblem::Step(const Rigid3& camera_from_world, Matrix6d* information) {
+  const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
+  NormalEquations equations;
+  eliminated_.clear();
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    const Eigen::Vector3d point = InCamera(rotation, camera_from_world, i);
+    if (!is_inlier_[i] || point.z() < kMinDepth) continue;
+    const LinearTerm term = Linearize(rotation, point, i);
+    const Eigen::Vector3d& residual = term.reprojection.residual;
+    const double u = depths_[i].u;
+    const double weight = HuberWeight(residual.squaredNorm() + u * u, Chi2Limit(observations_[i].seen.has_right()));
+    const Vector6d coupling = term.by_pose.transpose() * term.by_depth;
+    const double curvature = 1.0 + term.by_depth.squaredNorm(), gradient = term.by_depth.dot(residual) + u;
+    equations.information.noalias() += weight * (term.by_pose.transpose() * term.by_pose);
+    equations.information.noalias() -= (weight / curvature) * (coupling * coupling.transpose());
+    equations.gradient.noalias() += weight * (term.by_pose.transpose() * residual - (gradient / curvature) * coupling);
+    eliminated_.push_back({i, coupling, curvature, gradient});
+  }
+  if (prior_ != nullptr) {
+    const Eigen::Vector3d center = (camera_from_world * prior_->camera_from_world.Inverse()).translation;
+    equations.information.topLeftCorner<3, 3>() += prior_->information;
+    equations.gradient.head<3>() += prior_->information * center;
+  }
+  *information = equations.information;
+  const Vector6d step = equations.information.ldlt().solve(-equations.gradient);
+  if (!step.allFinite()) return std::nullopt;
+  for (const Eliminated& e : eliminated_) {
+    MoveDepth(e.observation, -(e.gradient + e.coupling.dot(step)) / e.curvature);
+  }
+  return step;
+}
 
 int PoseProblem::Classify(const Rigid3& camera_from_world) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
   int num_inliers = 0;
   double sum = 0.0;
   for (size_t i = 0; i < observations_.size(); ++i) {
-    const PixelObservation& seen = observations_[i].seen;
-    const Eigen::Vector3d point = rotation * observations_[i].point_in_world + camera_from_world.translation;
+    const bool has_right = observations_[i].seen.has_right();
     is_inlier_[i] = 0;
-    if (point.z() < kMinDepth) {
-      continue;
-    }
-    const Eigen::Vector3d residual = ReprojectionResidual(calibration_, baseline_m_, point, seen);
-    const double chi2 = residual.dot(residual);
-    if (chi2 <= Chi2Limit(seen.has_right())) {
-      is_inlier_[i] = 1;
-      ++num_inliers;
-      sum += chi2 / (seen.has_right() ? 3.0 : 2.0);
-    }
+    Eigen::Vector3d point = InCamera(rotation, camera_from_world, i);
+    if (point.z() < kMinDepth) continue;
+    const LinearTerm term = Linearize(rotation, point, i);
+    MoveDepth(i, -(term.by_depth.dot(term.reprojection.residual) + depths_[i].u) / (1.0 + term.by_depth.squaredNorm()));
+    point = InCamera(rotation, camera_from_world, i);
+    if (point.z() < kMinDepth) continue;
+    const double chi2 = ReprojectionResidual(calibration_, baseline_m_, point, observations_[i].seen).squaredNorm() +
+                        depths_[i].u * depths_[i].u;
+    if (chi2 > Chi2Limit(has_right)) continue;
+    is_inlier_[i] = 1;
+    ++num_inliers;
+    sum += chi2 / (has_right ? 3.0 : 2.0);
   }
   rms_ = num_inliers > 0 ? std::sqrt(sum / num_inliers) : 0.0;
   return num_inliers;
 }
 
-NormalEquations PoseProblem::Linearize(const Rigid3& camera_from_world, bool robust) const {
-  const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
-  NormalEquations equations;
-  for (size_t i = 0; i < observations_.size(); ++i) {
-    const Eigen::Vector3d point = rotation * observations_[i].point_in_world + camera_from_world.translation;
-    if (!is_inlier_[i] || point.z() < kMinDepth) {
-      continue;
-    }
-    const Reprojection r = Reproject(calibration_, baseline_m_, point, observations_[i].seen);
-    // d(point)/d(delta) = [I, -[point]x] for Retract's left perturbation.
-    Eigen::Matrix<double, 3, 6> by_pose;
-    by_pose << r.by_point, -r.by_point * Skew(point);
-    const double chi2 = r.residual.dot(r.residual);
-    const double loss = robust ? HuberWeight(chi2, Chi2Limit(observations_[i].seen.has_right())) : 1.0;
-    const Eigen::Matrix<double, 6, 3> weighted = loss * by_pose.transpose();
-    equations.information.noalias() += weighted * by_pose;
-    equations.gradient.noalias() += weighted * r.residual;
-  }
-  return equations;
-}
-
 }  // namespace
+
+Eigen::Matrix3d TranslationCovariance(const Eigen::Matrix<double, 6, 6>& information) {
+  // Schur's complement of the rotation.
+  const Eigen::Matrix3d coupling = information.topRightCorner<3, 3>();
+  const Eigen::Matrix3d rotation = information.bottomRightCorner<3, 3>();
+  const Eigen::Matrix3d alone =
+      information.topLeftCorner<3, 3>() - coupling * rotation.inverse() * coupling.transpose();
+  return alone.inverse();
+}
 
 PoseOptimizationResult OptimizePose(const CameraCalibration& calibration, double baseline_m,
                                     std::span<const PoseObservation> observations, const Rigid3& camera_from_world,
-                                    const PoseOptimizationOptions& options) {
-  PoseProblem problem(calibration, baseline_m, observations);
+                                    const PoseOptimizationOptions& options, const PosePrior* prior) {
+  PoseProblem problem(calibration, baseline_m, observations, camera_from_world, prior);
   PoseOptimizationResult result;
   result.camera_from_world = camera_from_world;
   for (int round = 0; round < options.num_rounds; ++round) {
     for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
-      const NormalEquations equations = problem.Linearize(result.camera_from_world, true);
-      result.information = equations.information;
-      const Vector6d step = equations.information.ldlt().solve(-equations.gradient);
-      if (!step.allFinite()) {
-        break;
-      }
-      result.camera_from_world = Retract(result.camera_from_world, step);
-      if (step.norm() < options.min_step) {
-        break;
-      }
+      const std::optional<Vector6d> step = problem.Step(result.camera_from_world, &result.information);
+      if (!step) break;
+      result.camera_from_world = Retract(result.camera_from_world, *step);
+      if (step->norm() < options.min_step) break;
     }
     result.num_inliers = problem.Classify(result.camera_from_world);
     if (result.num_inliers < kMinInliers) {

@@ -68,7 +68,7 @@ uint64_t HashOf(KeyframeId id, const Keyframe& keyframe) {
 uint64_t HashOf(LandmarkId id, const Landmark& landmark) {
   FactHash hash(2);
   hash.Add(id.value).Add(landmark.position_in_world).Add(landmark.normal);
-  hash.Add(landmark.min_distance).Add(landmark.max_distance);
+  hash.Add(landmark.depth_sigma).Add(landmark.min_distance).Add(landmark.max_distance);
   for (const uint64_t word : landmark.descriptor) hash.Add(word);
   return hash.value();
 }
@@ -313,6 +313,7 @@ std::string Map::Sha256Hex() const {
     for (const Eigen::Vector3d& v : {landmark.position_in_world, landmark.normal}) {
       for (const double number : {v.x(), v.y(), v.z()}) sha.Add(number);
     }
+    sha.Add(landmark.depth_sigma);
     sha.Add(landmark.min_distance);
     sha.Add(landmark.max_distance);
     for (const uint64_t word : landmark.descriptor) sha.Add(static_cast<int64_t>(word));

@@ -31,7 +31,8 @@ struct Observation {
 struct Landmark {
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();  // meters (mono: units of the map)
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // mean unit direction from the landmark to the cameras that saw it
-  double min_distance = 0.0;                         // between these distances from a camera its scale fits the pyramid
+  double depth_sigma = 0.0;   // standard deviation of the position along the normal, as its observers alone fix it
+  double min_distance = 0.0;  // between these distances from a camera its scale fits the pyramid
   double max_distance = 0.0;
   Descriptor descriptor{};  // the observation's that is nearest to all others
   bool operator==(const Landmark&) const = default;

@@ -3,9 +3,9 @@
 #include <set>
 #include <vector>
 
-#include "map/landmark_description.h"
 #include "map/neighborhood.h"
 #include "map/spanning_tree.h"
+#include "measurement/landmark_description.h"
 
 namespace tessera {
 namespace {

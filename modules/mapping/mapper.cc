@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "map/landmark_description.h"
 #include "map/map_editor.h"
+#include "measurement/landmark_description.h"
 #include "measurement/landmark_view.h"
 #include "optimization/local_adjustment.h"
 

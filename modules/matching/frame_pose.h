@@ -10,4 +10,8 @@ namespace tessera {
 // of points that are left.
 int OptimizeFrame(const PoseOptimizationOptions& options, TrackedFrame& frame);
 
+// The same with a prior (nullptr: none), and all that is known of the result.
+PoseOptimizationResult OptimizeFramePose(const PoseOptimizationOptions& options, const PosePrior* prior,
+                                         TrackedFrame& frame);
+
 }  // namespace tessera

@@ -1,6 +1,6 @@
 #include "tracking/map_replica.h"
 
-#include "map/landmark_description.h"
+#include "measurement/landmark_description.h"
 
 namespace tessera {
 

@@ -1,23 +1,30 @@
 #include "tracking/map_tracker.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
 #include "geometry/absolute_pose.h"
-#include "map/landmark_description.h"
 #include "matching/frame_pose.h"
+#include "measurement/landmark_description.h"
 #include "tracking/local_points.h"
 
 namespace tessera {
 namespace {
 
-// A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark.
-Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera) {
+// A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark. `covariance`: of the
+// point, if its depth isn't known by the view itself.
+Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera,
+                 const Eigen::Matrix3d* covariance = nullptr) {
   Landmark point;
   const double distance = point_in_camera.norm();
   point.position_in_world = point_in_camera;
   point.normal = -point_in_camera / distance;
+  const double information = covariance != nullptr
+                                 ? 1.0 / point.normal.dot(*covariance * point.normal)
+                                 : DepthInformation(view.features(), keypoint, Rigid3::Identity(), point);
+  point.depth_sigma = DepthSigma(information, distance);
   point.max_distance = distance * LevelScale(view.keypoint(keypoint).level);
   point.min_distance = point.max_distance / LevelScale(kTopLevel);
   point.descriptor = view.descriptor(keypoint);
@@ -108,7 +115,7 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
 }
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
-  current_from_last_.reset();
+  motion_.Reset();
   return view->baseline_m() > 0.0 ? StartFromDepth(view, keyframes) : StartFromPair(view, keyframes);
 }
 
@@ -137,7 +144,8 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   second.world_from_camera = world_from_start_ * first_from_second;
   SentKeyframe sent{{}, world_from_start_, {}};
   for (const MonoStart::Point& point : start->points) {
-    const Landmark in_camera = PointOf(*start->first, point.keypoint_first, point.point.point_in_world);
+    const Landmark in_camera =
+        PointOf(*start->first, point.keypoint_first, point.point.point_in_world, &point.point.covariance);
     sent.points[point.keypoint_first] = in_camera;
     second.points[Index(point.keypoint_second)] = {{{}, first_id, point.keypoint_first},
                                                    InWorld(Sim3::From(world_from_start_), in_camera)};
@@ -172,9 +180,33 @@ bool MapTracker::Localize(const Frame& view) {
   if (!is_near) return false;
   MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
   const int min_inliers = lost_since_us_ ? options_.min_relocalized_inliers : options_.min_inliers;
-  if (OptimizeFrame(options_.pose, frame) < min_inliers) return false;
-  Remember(std::move(frame));
+  const PoseOptimizationResult pose = OptimizeWithMotion(frame);
+  if (pose.num_inliers < min_inliers) return false;
+  Remember(std::move(frame), pose.information);
   return true;
+}
+
+std::optional<MotionPrediction> MapTracker::PredictMotion(const FrameView& view) const {
+  const int64_t interval_us = view.features().utime_us - last_->frame.view->features().utime_us;
+  return interval_us > 0 ? motion_.Predict(1e-6 * static_cast<double>(interval_us)) : std::nullopt;
+}
+
+// By the images alone where they fix how far the camera went, else carried by how it moved a moment ago.
+PoseOptimizationResult MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
+  TrackedFrame matched = frame;
+  const PoseOptimizationResult by_images = OptimizeFramePose(options_.pose, nullptr, frame);
+  const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
+  if (!motion || !motion->is_steady) return by_images;
+  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const double scale = world_from_reference.scale;
+  if (!IsStepWeak(*motion, TranslationCovariance(by_images.information) / (scale * scale))) return by_images;
+
+  matched.world_from_camera =
+      (world_from_reference * (last_->reference_from_camera * motion->last_from_current)).Pose();
+  const PosePrior prior{matched.world_from_camera.Inverse(), (motion->covariance * scale * scale).inverse()};
+  const PoseOptimizationResult carried = OptimizeFramePose(options_.pose, &prior, matched);
+  frame = std::move(matched);
+  return carried;
 }
 
 KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
@@ -182,7 +214,8 @@ KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
 }
 
 bool MapTracker::FollowLast(TrackedFrame& frame) const {
-  const Rigid3 last_from_current = current_from_last_.value_or(Rigid3::Identity()).Inverse();
+  const std::optional<MotionPrediction> motion = PredictMotion(*frame.view);
+  const Rigid3 last_from_current = motion ? motion->last_from_current : Rigid3::Identity();
   const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
   const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
   for (const double widening : {1.0, 2.0, 4.0}) {
@@ -234,16 +267,22 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   reference_ = answer.reference;
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
-  current_from_last_.reset();
+  motion_.Reset();
   last_.emplace(Last{std::move(frame), reference_from_camera});
   return true;
 }
 
-void MapTracker::Remember(TrackedFrame frame) {
+void MapTracker::Remember(TrackedFrame frame, const Eigen::Matrix<double, 6, 6>& information) {
   const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
-  current_from_last_.reset();
-  if (!lost_since_us_) current_from_last_ = reference_from_camera.Inverse() * last_->reference_from_camera;
+  const int64_t interval_us = frame.view->features().utime_us - last_->frame.view->features().utime_us;
+  if (lost_since_us_ || interval_us <= 0) {
+    motion_.Reset();
+  } else {
+    const double scale = reference_from_world.scale;
+    motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera,
+                TranslationCovariance(information) * scale * scale, 1e-6 * static_cast<double>(interval_us));
+  }
   lost_since_us_.reset();
   last_.emplace(Last{std::move(frame), reference_from_camera});
 }

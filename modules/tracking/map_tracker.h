@@ -20,6 +20,7 @@
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/map_replica.h"
+#include "tracking/motion_model.h"
 
 namespace tessera {
 
@@ -92,10 +93,12 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
   bool Localize(const Frame& view);
+  std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
   bool FollowLast(TrackedFrame& frame) const;
+  PoseOptimizationResult OptimizeWithMotion(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
   KnownPoints PointsAround(const TrackedFrame& frame) const;
-  void Remember(TrackedFrame frame);
+  void Remember(TrackedFrame frame, const Eigen::Matrix<double, 6, 6>& information);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
@@ -105,8 +108,8 @@ class MapTracker {
   MapReplica replica_;
   MonoInitializer initializer_;
   KeyframeDecision decision_;
-  std::optional<Last> last_;                 // nullopt: no part of the map is followed
-  std::optional<Rigid3> current_from_last_;  // velocity: motion over the last frame interval, in the reference's units
+  std::optional<Last> last_;  // nullopt: no part of the map is followed
+  MotionModel motion_;        // in the reference's units
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
   Rigid3 world_from_start_;        // camera where the next part of the map begins

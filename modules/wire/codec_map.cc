@@ -34,6 +34,7 @@ struct Layout<map_landmark_t> {
     fields(message.landmark, changed.id);
     fields(message.position_in_world, landmark.position_in_world);
     fields(message.normal, landmark.normal);
+    fields(message.depth_sigma, landmark.depth_sigma);
     fields(message.min_distance, landmark.min_distance);
     fields(message.max_distance, landmark.max_distance);
     fields(message.descriptor, landmark.descriptor);

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "map/landmark_description.h"
 #include "map/map_editor.h"
+#include "measurement/landmark_description.h"
 #include "support/map_changes.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"

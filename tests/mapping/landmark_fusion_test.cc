@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "map/landmark_description.h"
 #include "map/map_editor.h"
+#include "measurement/landmark_description.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 

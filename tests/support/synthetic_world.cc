@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "map/landmark_description.h"
 #include "map/map_editor.h"
+#include "measurement/landmark_description.h"
 #include "measurement/landmark_view.h"
 
 namespace tessera {

@@ -8,6 +8,9 @@ namespace tessera {
 // The landmark with normal, distance range and descriptor computed anew from its present observations (at least one):
 //
 //   normal = normalized mean over observations of (camera_in_world - position) / |camera_in_world - position|
+//   depth_sigma = (sum over observations of |d(pixel)/d(position) normal|^2 / sigma_px^2)^-1/2, at most d; at least d /
+//   2
+//     where two views without a depth of their own are all there is
 //   max_distance = d * 1.2^level,  min_distance = max_distance / 1.2^kTopLevel
 //
 // with d and level from the newest keyframe that saw it: closer than min_distance or farther than max_distance its
@@ -20,6 +23,14 @@ Landmark DescribeLandmark(const Map& map, LandmarkId id);
 Landmark DescribeMovedLandmark(const Map& map, LandmarkId id);
 
 inline constexpr int kMaxDescriptors = 12;
+
+// What one observation says about the landmark's position along its normal, the camera's pose taken as exact: the
+// inverse of a variance, 1 / m^2 (mono: in units of the map). 0 where the landmark stands behind the camera.
+double DepthInformation(const FeatureFrame& features, int32_t keypoint, const Rigid3& world_from_camera,
+                        const Landmark& landmark);
+// The standard deviation that all information together leaves; never more than the distance itself, which is what
+// nothing but a direction is known by.
+double DepthSigma(double information, double distance);
 
 // The landmark of a keyframe's frame and units in the world's.
 Landmark InWorld(const Sim3& world_from_keyframe, Landmark point_in_keyframe);

@@ -1,4 +1,4 @@
-#include "map/landmark_description.h"
+#include "measurement/landmark_description.h"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,19 @@
-#include "map/landmark_description.h"
+#include "measurement/landmark_description.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "features/pyramid.h"
+#include "measurement/keypoint_measurement.h"
 
 namespace tessera {
 namespace {
+
+// Two views agree on a depth whatever they see, also where their keypoints only look alike: it takes a third one to
+// confirm it. Until then the depth is known to half of itself.
+constexpr size_t kConfirmingObservations = 3;
+constexpr double kUnconfirmedShare = 0.5;
 
 Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in_world,
                               const std::vector<Observation>& observations) {
@@ -17,6 +23,16 @@ Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in
     sum += (camera_in_world - position_in_world).normalized();
   }
   return sum.normalized();
+}
+
+// How well the observations fix the position along the normal, the cameras' poses taken as exact.
+double DepthInformation(const Map& map, const Landmark& landmark, const std::vector<Observation>& observations) {
+  double information = 0.0;
+  for (const Observation& observation : observations) {
+    const Keyframe& keyframe = *map.FindKeyframe(observation.keyframe);
+    information += DepthInformation(*keyframe.features, observation.keypoint, keyframe.world_from_camera, landmark);
+  }
+  return information;
 }
 
 Descriptor Medoid(const std::vector<Descriptor>& descriptors) {
@@ -39,6 +55,18 @@ Descriptor Medoid(const std::vector<Descriptor>& descriptors) {
 
 }  // namespace
 
+double DepthInformation(const FeatureFrame& features, int32_t keypoint, const Rigid3& world_from_camera,
+                        const Landmark& landmark) {
+  const CameraCalibration& camera = features.calibration;
+  const Eigen::Matrix3d camera_from_world = world_from_camera.rotation.toRotationMatrix().transpose();
+  const Eigen::Vector3d point = camera_from_world * (landmark.position_in_world - world_from_camera.translation);
+  if (point.z() < kMinDepth) return 0.0;
+  const Reprojection seen = Reproject(camera, Baseline(camera), point, SeenAt(features, keypoint));
+  return (seen.by_point * (camera_from_world * landmark.normal)).squaredNorm();
+}
+
+double DepthSigma(double information, double distance) { return std::min(distance, 1.0 / std::sqrt(information)); }
+
 Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   Landmark landmark = *map.FindLandmark(id);
   const std::vector<Observation>& observations = map.ObservationsOf(id);
@@ -47,6 +75,11 @@ Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   const Keyframe& newest = *map.FindKeyframe(observations.back().keyframe);
   const Keypoint& keypoint = newest.features->keypoints[Index(observations.back().keypoint)];
   const double distance = (newest.world_from_camera.translation - landmark.position_in_world).norm();
+  landmark.depth_sigma = DepthSigma(DepthInformation(map, landmark, observations), distance);
+  const bool has_depth = SeenAt(*newest.features, observations.back().keypoint).has_right();
+  if (!has_depth && observations.size() < kConfirmingObservations) {
+    landmark.depth_sigma = std::max(landmark.depth_sigma, kUnconfirmedShare * distance);
+  }
   landmark.max_distance = distance * LevelScale(keypoint.level);
   landmark.min_distance = landmark.max_distance / LevelScale(kTopLevel);
   return landmark;
@@ -68,6 +101,7 @@ Landmark DescribeLandmark(const Map& map, LandmarkId id) {
 Landmark InWorld(const Sim3& world_from_keyframe, Landmark point) {
   point.position_in_world = world_from_keyframe * point.position_in_world;
   point.normal = world_from_keyframe.rotation * point.normal;
+  point.depth_sigma *= world_from_keyframe.scale;
   point.min_distance *= world_from_keyframe.scale;
   point.max_distance *= world_from_keyframe.scale;
   return point;
