@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "geometry/triangulation.h"
-#include "map/landmark_description.h"
 #include "measurement/feature_grid.h"
+#include "measurement/landmark_description.h"
 #include "measurement/landmark_view.h"
 
 namespace tessera {
@@ -24,10 +24,16 @@ LandmarkId AddLandmark(const Eigen::Vector3d& position_in_world, std::initialize
   return id;
 }
 
+// By how much the camera turned, rad.
+double AngleOf(const Rigid3& second_from_first) {
+  return 2.0 * std::acos(std::min(1.0, std::abs(second_from_first.rotation.w())));
+}
+
 // The search for second views of one keyframe's keypoints in another.
 class PairSearch {
  public:
-  PairSearch(const Map& map, KeyframeId first, KeyframeId second, double min_depth, const CreationOptions& options)
+  PairSearch(const Map& map, KeyframeId first, KeyframeId second, double min_depth, double min_parallax_per_turn,
+             const CreationOptions& options)
       : options_(options),
         first_(*map.FindKeyframe(first)),
         second_(*map.FindKeyframe(second)),
@@ -36,7 +42,8 @@ class PairSearch {
         second_from_first_(second_.world_from_camera.Inverse() * first_.world_from_camera),
         rotation_(second_from_first_.rotation.toRotationMatrix()),
         roll_(RollBetween(second_from_first_)),
-        max_inverse_depth_(1.0 / min_depth) {
+        max_inverse_depth_(1.0 / min_depth),
+        min_parallax_of_turn_(min_parallax_per_turn * AngleOf(second_from_first_)) {
     for (int level = 0; level < kMaxLevels; ++level) {
       limits_px_[static_cast<size_t>(level)] = std::sqrt(kChi2LimitOfOne) * LevelScale(level);
     }
@@ -77,6 +84,7 @@ class PairSearch {
   const Eigen::Matrix3d rotation_;
   const uint8_t roll_;
   const double max_inverse_depth_;
+  const double min_parallax_of_turn_;         // rad
   std::array<double, kMaxLevels> limits_px_;  // by level: how far from the line a keypoint may lie
   std::vector<int32_t> free_;                 // keypoints of the second keyframe that see no landmark
   FeatureGrid grid_;                          // of these, by their number in free_
@@ -159,10 +167,12 @@ std::optional<Eigen::Vector3d> PairSearch::Triangulate(const PixelObservation& i
     return seen.has_right() ? (seen.pixel_px.x() - seen.right_x_px) / calibration_.fx_px : 0.0;
   };
   const double by_first = stereo_parallax(in_first), by_second = stereo_parallax(in_second);
-  if (parallax >= std::max({options_.min_parallax_rad, by_first, by_second})) {
+  const double noise_rad = std::hypot(in_first.sigma_px, in_second.sigma_px) / calibration_.fx_px;
+  const double min_parallax = options_.min_parallax_sigmas * noise_rad;
+  if (parallax >= std::max({min_parallax, min_parallax_of_turn_, by_first, by_second})) {
     return TriangulateRays(second_from_first_, ray, ray_in_second);
   }
-  if (std::max(by_first, by_second) < options_.min_parallax_rad) return std::nullopt;
+  if (std::max(by_first, by_second) < min_parallax) return std::nullopt;
   if (by_first >= by_second) return PointFromDisparity(calibration_, baseline_m_, in_first);
   const auto point = PointFromDisparity(calibration_, baseline_m_, in_second);
   return point ? std::optional<Eigen::Vector3d>(second_from_first_.Inverse() * *point) : std::nullopt;
@@ -182,11 +192,25 @@ bool PairSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const Pixel
   return ratio < max_ratio && ratio * max_ratio > 1.0;
 }
 
+// The keyframe's keypoints that see no landmark yet, each with its match in the other keyframe.
+void CreateFromPair(KeyframeId id, KeyframeId other_id, const PairSearch& search, std::vector<LandmarkId>& created,
+                    MapEditor& editor) {
+  const Keyframe& keyframe = *editor.map().FindKeyframe(id);
+  const Keyframe& other = *editor.map().FindKeyframe(other_id);
+  for (int32_t i = 0; i < static_cast<int32_t>(keyframe.landmarks.size()); ++i) {
+    if (keyframe.landmarks[Index(i)].valid()) continue;
+    const auto match = search.Find(i);
+    if (!match || other.landmarks[Index(match->keypoint)].valid()) continue;
+    const Eigen::Vector3d position = keyframe.world_from_camera * match->point_in_first;
+    created.push_back(AddLandmark(position, {{id, i}, {other_id, match->keypoint}}, editor));
+  }
+}
+
 }  // namespace
 
 Result<> CreationOptions::Check() const {
   if (max_neighbors < 1) return Failed("new landmarks need at least one neighbor to be searched");
-  if (!(min_parallax_rad > 0.0) || !(min_baseline_share > 0.0))
+  if (!(min_parallax_sigmas > 0.0) || !(min_parallax_per_turn >= 0.0) || !(min_baseline_share > 0.0))
     return Failed("the least parallax and baseline of new landmarks must be positive");
   if (max_hamming < 1 || max_hamming > 256)
     return Failed("the Hamming distance of new landmarks must be between 1 and 256");
@@ -229,19 +253,19 @@ std::vector<LandmarkId> CreateFromPairs(KeyframeId id, const CreationOptions& op
   const double camera_baseline_m = Baseline(keyframe.features->calibration);
   const double min_baseline = camera_baseline_m > 0.0 ? camera_baseline_m : options.min_baseline_share * median_depth;
 
-  for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
-    const Keyframe& other = *map.FindKeyframe(other_id);
-    const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
-    if (baseline < min_baseline) continue;
-    const PairSearch search(map, id, other_id, min_depth, options);
-    for (int32_t i = 0; i < static_cast<int32_t>(keyframe.landmarks.size()); ++i) {
-      if (keyframe.landmarks[Index(i)].valid()) continue;
-      const auto match = search.Find(i);
-      if (!match || other.landmarks[Index(match->keypoint)].valid()) continue;
-      const Eigen::Vector3d position = keyframe.world_from_camera * match->point_in_first;
-      created.push_back(AddLandmark(position, {{id, i}, {other_id, match->keypoint}}, editor));
+  const auto search_neighbors = [&](double min_parallax_per_turn) {
+    for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
+      const Keyframe& other = *map.FindKeyframe(other_id);
+      const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
+      if (baseline < min_baseline) continue;
+      const PairSearch search(map, id, other_id, min_depth, min_parallax_per_turn, options);
+      CreateFromPair(id, other_id, search, created, editor);
     }
-  }
+  };
+  search_neighbors(options.min_parallax_per_turn);
+  const auto num_landmarks = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(),
+                                           [](LandmarkId landmark) { return landmark.valid(); });
+  if (num_landmarks < options.min_landmarks) search_neighbors(0.0);
   return created;
 }
 

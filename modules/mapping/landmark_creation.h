@@ -10,10 +10,16 @@ namespace tessera {
 
 struct CreationOptions {
   int max_neighbors = 10;  // keyframes searched for a second view, most shared landmarks first
-  // 1.4 degrees. Depths from less come out too far, by (noise / parallax)^2, and in a sharp turn, where each generation
-  // of points is placed by the one before, that adds up: 10 % of scale in KITTI 03's turn at 1 degree, 7 % at 2
-  // degrees. But few points on a straight road reach 2 degrees in time.
-  double min_parallax_rad = 0.025;
+  // Parallax that a new landmark needs, in standard deviations of a parallax as its two keypoints' noise gives it: by
+  // so much its depth differs from infinity. How little less is known of a far landmark stands in
+  // Landmark::depth_sigma.
+  double min_parallax_sigmas = 3.0;
+  // And as a share of the angle by which the camera turned between the two views. Noise averages out over hundreds of
+  // landmarks. What is systematic in the images (the rest of a lens distortion, a rolling shutter) does not, and grows
+  // with the way that a keypoint makes through the image: an error of 1 % of the turn is one of 5 % of the depth.
+  double min_parallax_per_turn = 0.2;
+  // A keyframe that sees fewer landmarks than this gets some in spite of the turn.
+  int min_landmarks = 150;
   double min_baseline_share = 0.01;  // mono: a neighbor must be this part of the median depth away
   int max_hamming = 50;              // bits of 256: what patches of one point differ by, nearly always
   double max_hamming_ratio = 0.85;   // best match to the second best along the line, elsewhere on it

@@ -161,7 +161,6 @@ struct TrackerSettings {
 
 struct MapperSettings {
   static constexpr const char* kSection = "mapper";
-  double min_parallax_rad = 0.0;
   int max_inner_keyframes = 0;
   int max_outer_keyframes = 0;
   bool close_loops = false;
@@ -171,7 +170,6 @@ struct MapperSettings {
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
-    field("min_parallax_rad", self.min_parallax_rad, Range{1e-4, 1, "rad"});
     field("max_inner_keyframes", self.max_inner_keyframes, Range{2, 1000, "keyframes"});
     field("max_outer_keyframes", self.max_outer_keyframes, Range{1, 1000, "keyframes"});
     field("close_loops", self.close_loops);

@@ -30,7 +30,6 @@ TEST(DefaultSettings, OfTheTracker) {
 TEST(DefaultSettings, OfTheMapper) {
   const auto settings = Defaults<MapperSettings>();
   const MapperSessionOptions options;
-  EXPECT_EQ(settings.min_parallax_rad, options.mapper.creation.min_parallax_rad);
   EXPECT_EQ(settings.max_inner_keyframes, options.mapper.window.max_inner_keyframes);
   EXPECT_EQ(settings.max_outer_keyframes, options.mapper.window.max_outer_keyframes);
   EXPECT_EQ(settings.loop_delay_keyframes, options.delays.loop_keyframes);

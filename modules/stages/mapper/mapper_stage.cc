@@ -10,7 +10,6 @@ namespace {
 
 MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
   MapperSessionOptions options;
-  options.mapper.creation.min_parallax_rad = settings.min_parallax_rad;
   options.mapper.window.max_inner_keyframes = settings.max_inner_keyframes;
   options.mapper.window.max_outer_keyframes = settings.max_outer_keyframes;
   options.delays.loop_keyframes = settings.loop_delay_keyframes;
