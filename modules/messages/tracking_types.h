@@ -31,10 +31,12 @@ struct PoseEstimate {
   int32_t num_landmarks = 0;      // landmarks in the map
   bool is_keyframe = false;
   bool is_relocalized = false;  // the first pose after a loss, in a part of the map that was there before
-  FrameId relocalized_by;       // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
-  int64_t num_deltas = 0;       // deltas that the map had seen by then: its step
-  bool is_live = false;         // the step is what happened to be there, not what logical time asks for
-  int64_t map_wait_us = 0;      // how long the frame had to wait for its step; for measuring only
+  // The images contradict the motion of a moment ago: the scale may have slipped. The pose follows the motion.
+  bool is_step_doubtful = false;
+  FrameId relocalized_by;   // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
+  int64_t num_deltas = 0;   // deltas that the map had seen by then: its step
+  bool is_live = false;     // the step is what happened to be there, not what logical time asks for
+  int64_t map_wait_us = 0;  // how long the frame had to wait for its step; for measuring only
 };
 
 // A keypoint that sees what a keypoint of an earlier keyframe saw, said before the tracker knows the landmark's id.

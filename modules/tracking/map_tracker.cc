@@ -112,6 +112,7 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
   result.pose.reference_from_camera = last_->reference_from_camera;
   result.pose.num_inliers = last_->frame.NumPoints();
   result.pose.is_keyframe = !result.keyframes.empty();
+  result.pose.is_step_doubtful = last_->evidence == StepEvidence::kContradictory;
 }
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
@@ -180,9 +181,9 @@ bool MapTracker::Localize(const Frame& view) {
   if (!is_near) return false;
   MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
   const int min_inliers = lost_since_us_ ? options_.min_relocalized_inliers : options_.min_inliers;
-  const PoseOptimizationResult pose = OptimizeWithMotion(frame);
-  if (pose.num_inliers < min_inliers) return false;
-  Remember(std::move(frame), pose.information);
+  const FramePose pose = OptimizeWithMotion(frame);
+  if (pose.optimized.num_inliers < min_inliers) return false;
+  Remember(std::move(frame), pose);
   return true;
 }
 
@@ -192,21 +193,24 @@ std::optional<MotionPrediction> MapTracker::PredictMotion(const FrameView& view)
 }
 
 // By the images alone where they fix how far the camera went, else carried by how it moved a moment ago.
-PoseOptimizationResult MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
+MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
   TrackedFrame matched = frame;
   const PoseOptimizationResult by_images = OptimizeFramePose(options_.pose, nullptr, frame);
   const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
-  if (!motion || !motion->is_steady) return by_images;
+  if (!motion) return {by_images, StepEvidence::kStrong};
   const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
-  const double scale = world_from_reference.scale;
-  if (!IsStepWeak(*motion, TranslationCovariance(by_images.information) / (scale * scale))) return by_images;
+  const double area = world_from_reference.scale * world_from_reference.scale;
+  const Rigid3 reference_from_camera = (world_from_reference.Inverse() * frame.world_from_camera).Pose();
+  const StepEvidence evidence = Judge(*motion, last_->reference_from_camera.Inverse() * reference_from_camera,
+                                      TranslationCovariance(by_images.information) / area);
+  if (evidence == StepEvidence::kStrong) return {by_images, evidence};
 
   matched.world_from_camera =
       (world_from_reference * (last_->reference_from_camera * motion->last_from_current)).Pose();
-  const PosePrior prior{matched.world_from_camera.Inverse(), (motion->covariance * scale * scale).inverse()};
+  const PosePrior prior{matched.world_from_camera.Inverse(), (motion->covariance * area).inverse()};
   const PoseOptimizationResult carried = OptimizeFramePose(options_.pose, &prior, matched);
   frame = std::move(matched);
-  return carried;
+  return {carried, evidence};
 }
 
 KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
@@ -272,7 +276,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   return true;
 }
 
-void MapTracker::Remember(TrackedFrame frame, const Eigen::Matrix<double, 6, 6>& information) {
+void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
   const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const int64_t interval_us = frame.view->features().utime_us - last_->frame.view->features().utime_us;
@@ -281,10 +285,11 @@ void MapTracker::Remember(TrackedFrame frame, const Eigen::Matrix<double, 6, 6>&
   } else {
     const double scale = reference_from_world.scale;
     motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera,
-                TranslationCovariance(information) * scale * scale, 1e-6 * static_cast<double>(interval_us));
+                TranslationCovariance(pose.optimized.information) * scale * scale,
+                1e-6 * static_cast<double>(interval_us), pose.evidence != StepEvidence::kStrong);
   }
   lost_since_us_.reset();
-  last_.emplace(Last{std::move(frame), reference_from_camera});
+  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence});
 }
 
 // Whether the loss has lasted so long that a new part of the map should begin.

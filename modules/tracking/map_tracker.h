@@ -82,6 +82,12 @@ class MapTracker {
   struct Last {
     TrackedFrame frame;
     Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
+    StepEvidence evidence = StepEvidence::kStrong;
+  };
+
+  struct FramePose {
+    PoseOptimizationResult optimized;
+    StepEvidence evidence = StepEvidence::kStrong;
   };
 
   MapTrackingResult UndecidedResult(const FrameView& view) const;
@@ -95,10 +101,10 @@ class MapTracker {
   bool Localize(const Frame& view);
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
   bool FollowLast(TrackedFrame& frame) const;
-  PoseOptimizationResult OptimizeWithMotion(TrackedFrame& frame) const;
+  FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
   KnownPoints PointsAround(const TrackedFrame& frame) const;
-  void Remember(TrackedFrame frame, const Eigen::Matrix<double, 6, 6>& information);
+  void Remember(TrackedFrame frame, const FramePose& pose);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);

@@ -1,49 +1,75 @@
 #include "tracking/motion_model.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 namespace tessera {
 namespace {
 
-constexpr double kMemory = 2.0;         // seconds that q remembers
-constexpr int kMinMotions = 10;         // before q is trusted
+constexpr double kMemory_s = 2.0;       // of q and r
+constexpr int kMinMotions = 10;         // before they are trusted
+constexpr double kMinWalkShare = 0.02;  // of the variance of changes: no camera's velocity is constant
 constexpr double kMinSteadiness = 5.0;  // |v| in standard deviations: a camera that stands still predicts nothing
 constexpr double kWeakShare = 0.2;      // of the step
-constexpr double kMinWalkShare = 0.01;  // q is at least (this share of |v|)^2 a second
+constexpr double kMaxSigmas = 5.0;
+constexpr double kMinShare = 0.7, kMaxShare = 1.4;  // of the predicted length
 
 }  // namespace
 
-void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s) {
-  const Eigen::Vector3d velocity = last_from_current.translation / interval_s;
-  if (num_motions_ > 0) {
-    const double sample = (velocity - velocity_).squaredNorm() / 3.0 / interval_s;
-    const double share = std::max(1.0 - std::exp(-interval_s / kMemory), 1.0 / num_motions_);
-    walk_ += share * (sample - walk_);
-  }
-  velocity_ = velocity;
+void MotionModel::LearnNoise(const Eigen::Vector3d& measured, double interval_s) {
+  const Eigen::Vector3d change = measured - measured_;
+  const double share = std::max(1.0 - std::exp(-interval_s / kMemory_s), 1.0 / (num_motions_ - 1));
+  change_variance_ += share * (change.squaredNorm() / 3.0 - change_variance_);
+  change_covariance_ += share * (change.dot(change_) / 3.0 - change_covariance_);
+  noise_ = std::clamp(-change_covariance_, 0.0, 0.5 * change_variance_);
+  walk_ = std::max(change_variance_ - 2.0 * noise_, kMinWalkShare * change_variance_) / interval_s;
+  change_ = change;
+}
+
+void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s,
+                      bool is_carried) {
+  const Eigen::Vector3d measured = last_from_current.translation / interval_s;
+  const Eigen::Matrix3d variance = covariance / (interval_s * interval_s);
   turn_rate_ = LogSO3(last_from_current.rotation) / interval_s;
-  variance_ = covariance / (interval_s * interval_s);
   ++num_motions_;
+  if (num_motions_ == 1 || is_carried) {
+    velocity_ = measured;
+    variance_ = variance;
+    change_.setZero();
+  } else {
+    LearnNoise(measured, interval_s);
+    const Eigen::Matrix3d predicted = variance_ + walk_ * interval_s * Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d total = predicted + variance + noise_ * Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d gain = predicted * total.inverse();
+    velocity_ += gain * (measured - velocity_);
+    variance_ = predicted - gain * predicted;
+  }
+  measured_ = measured;
 }
 
 std::optional<MotionPrediction> MotionModel::Predict(double interval_s) const {
   if (num_motions_ == 0) return std::nullopt;
-  const double walk = std::max(walk_, kMinWalkShare * kMinWalkShare * velocity_.squaredNorm());
-  const Eigen::Matrix3d variance = variance_ + walk * interval_s * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d variance = variance_ + walk_ * interval_s * Eigen::Matrix3d::Identity();
   MotionPrediction prediction;
   prediction.last_from_current = {ExpSO3(turn_rate_ * interval_s), velocity_ * interval_s};
   prediction.covariance = variance * (interval_s * interval_s);
+  const double squared = velocity_.squaredNorm();
   const double along = velocity_.dot(variance * velocity_);  // |v|^2 times the variance along v
-  prediction.is_steady = num_motions_ >= kMinMotions &&
-                         velocity_.squaredNorm() * velocity_.squaredNorm() > kMinSteadiness * kMinSteadiness * along;
+  prediction.is_steady = num_motions_ >= kMinMotions && squared * squared > kMinSteadiness * kMinSteadiness * along;
   return prediction;
 }
 
-bool IsStepWeak(const MotionPrediction& prediction, const Eigen::Matrix3d& covariance) {
+StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, const Eigen::Matrix3d& covariance) {
+  if (!prediction.is_steady) return StepEvidence::kStrong;
   const Eigen::Vector3d& step = prediction.last_from_current.translation;
   const double squared = step.squaredNorm();
-  return step.dot(covariance * step) > kWeakShare * kWeakShare * squared * squared;
+  if (step.dot(covariance * step) > kWeakShare * kWeakShare * squared * squared) return StepEvidence::kWeak;
+  const Eigen::Vector3d difference = by_images.translation - step;
+  const double chi2 = difference.dot((prediction.covariance + covariance).inverse() * difference);
+  const double share = by_images.translation.dot(step) / squared;
+  const bool is_plausible = chi2 <= 3.0 * kMaxSigmas * kMaxSigmas || (share >= kMinShare && share <= kMaxShare);
+  return is_plausible ? StepEvidence::kStrong : StepEvidence::kContradictory;
 }
 
 }  // namespace tessera

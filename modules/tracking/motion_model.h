@@ -1,13 +1,16 @@
 // How the camera moved a moment ago, as a prior for how it moves now.
 //
-// The velocity v of the camera in its own frame is a random walk: between two moments dt apart it changes by a normal
-// amount of variance q dt an axis. q is what the last seconds showed. With P the variance of the present v,
+// The velocity v of the camera in its own frame is a random walk, and what the poses show of it is noisy:
 //
-//   translation over the next dt = v dt,   covariance = (P + q dt I) dt^2
+//   v(k+1) = v(k) + walk,  variance q dt an axis;     measured(k) = v(k) + noise,  variance r an axis
 //
-// All in time, not in frames, and in the units of the tracker's reference keyframe. A Kalman filter whose measurements
-// are the poses that images and prior gave together (pose_optimization.h), so that images which say little about the
-// translation leave v as it was.
+// A Kalman filter follows v. q and r are what the last seconds showed: with d(k) = measured(k) - measured(k-1),
+//
+//   E[d(k) d(k)] = q dt + 2 r,    E[d(k) d(k-1)] = -r                 (R. Mehra, "On the identification of variances
+//   and
+//                                                                      adaptive Kalman filtering", 1970)
+//
+// All in time, not in frames, and in the units of the tracker's reference keyframe.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,27 +23,44 @@ namespace tessera {
 struct MotionPrediction {
   Rigid3 last_from_current;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of its translation
-  bool is_steady = false;                                // enough was seen to trust it where images say less
+  bool is_steady = false;  // enough was seen of a moving camera to hold this against images
 };
 
 class MotionModel {
  public:
   void Reset() { *this = {}; }
-  // The camera moved so over `interval_s` > 0; `covariance`: of the translation.
-  void Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s);
+  // The camera moved so over `interval_s` > 0; `covariance`: of the translation, as the pose's optimization has it.
+  // `is_carried`: the prediction took part in it, so that it tells nothing new about q and r.
+  void Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s,
+           bool is_carried = false);
   // nullopt before the first motion.
   std::optional<MotionPrediction> Predict(double interval_s) const;
 
  private:
+  void LearnNoise(const Eigen::Vector3d& measured, double interval_s);
+
   int num_motions_ = 0;
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();   // units/s
-  Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  // rad/s
-  Eigen::Matrix3d variance_ = Eigen::Matrix3d::Zero();   // P, (units/s)^2
+  Eigen::Matrix3d variance_ = Eigen::Matrix3d::Zero();   // of it
+  Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  // rad/s, of the last motion
+  Eigen::Vector3d measured_ = Eigen::Vector3d::Zero();   // the last velocity
+  Eigen::Vector3d change_ = Eigen::Vector3d::Zero();     // d, to the one before
+  double change_variance_ = 0.0;                         // of d, an axis
+  double change_covariance_ = 0.0;                       // of d and the one before
+  double noise_ = 0.0;                                   // r, (units/s)^2
   double walk_ = 0.0;                                    // q, units^2/s^3
 };
 
-// Whether images alone leave the length of the step so uncertain (standard deviation along it of more than a fifth of
-// it) that the prediction should carry it. `covariance`: of the translation, by images alone.
-bool IsStepWeak(const MotionPrediction& prediction, const Eigen::Matrix3d& covariance);
+// What images say about a step against what was predicted.
+enum class StepEvidence {
+  kStrong,        // they fix the step, or nothing steady was predicted
+  kWeak,          // they leave its length open: a standard deviation along it of more than a fifth of it
+  kContradictory  // they fix another step, which a camera that moved as this one did a moment ago can't make
+};
+
+// `by_images` and `covariance`: the motion (last_from_current) and its translation's covariance by images alone. A
+// contradiction is a difference of more than five standard deviations an axis that changes the length along the
+// prediction by a third at least.
+StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, const Eigen::Matrix3d& covariance);
 
 }  // namespace tessera

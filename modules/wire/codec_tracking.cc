@@ -74,6 +74,7 @@ struct Layout<pose_t> {
     fields.Count(message.num_landmarks, pose.num_landmarks);
     fields(message.is_keyframe, pose.is_keyframe);
     fields(message.is_relocalized, pose.is_relocalized);
+    fields(message.is_step_doubtful, pose.is_step_doubtful);
     fields(message.relocalized_by, pose.relocalized_by);
     fields.Count(message.num_deltas, pose.num_deltas);
     fields(message.is_live, pose.is_live);

@@ -117,10 +117,10 @@ TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {
 TEST_F(RunFilesTest, FramesCsvHasARowPerFrame) {
   EXPECT_EQ(FramesCsv(SmallRun()),
             "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,"
-            "num_deltas\n"
-            "0,1403636584763555,initializing,,10.000,0.000,2000,50,40,900,0,0\n"
-            "1,1403636584763556,tracked,4.000,14.000,0.000,2000,50,40,900,1,0\n"
-            "2,1403636584763557,lost,4.000,18.000,6.000,2000,50,40,900,0,1\n");
+            "num_deltas,is_step_doubtful\n"
+            "0,1403636584763555,initializing,,10.000,0.000,2000,50,40,900,0,0,0\n"
+            "1,1403636584763556,tracked,4.000,14.000,0.000,2000,50,40,900,1,0,0\n"
+            "2,1403636584763557,lost,4.000,18.000,6.000,2000,50,40,900,0,1,0\n");
 }
 
 TEST_F(RunFilesTest, LoopsCsvHasARowPerLoop) {

@@ -74,6 +74,7 @@ class Frames:
     inliers: np.ndarray
     landmarks: np.ndarray  # in the tracker's copy of the map
     is_keyframe: np.ndarray  # bool
+    is_step_doubtful: np.ndarray  # bool: the images contradict the motion of a moment before
     numbers: np.ndarray
 
 
@@ -227,6 +228,7 @@ def read_frames(path: Path) -> Frames | None:
             inliers=column("inliers"),
             landmarks=column("landmarks"),
             is_keyframe=column("is_keyframe") > 0,
+            is_step_doubtful=column("is_step_doubtful") > 0,
             numbers=column("frame").astype(int),
         )
     except (KeyError, ValueError) as error:

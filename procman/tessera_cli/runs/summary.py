@@ -8,8 +8,11 @@ from typing import Any
 
 from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
-from tessera_cli.runs.run_folder import Result, Summary, default_alignment, read_run
+from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run
 from tessera_cli.versions import collect_versions
+
+# Frames with doubtful steps that are no farther apart belong to one stretch.
+MAX_GAP_FRAMES = 30
 
 # Copied unchanged from the evaluator's run.json.
 EVALUATOR_KEYS = (
@@ -80,11 +83,37 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "max_rss_mb": {name: round(rss_mb, 1) for name, rss_mb in processes.max_rss_mb.items()},
         "messages_undecodable": facts.messages_undecodable,
         "extractor_restarts": processes.num_extractor_restarts,
-        "warnings": processes.warnings,
+        "warnings": processes.warnings + scale_warnings(result.frames, facts.sensor),
         "versions": collect_versions(),
     }
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     return replace(result, summary=summary)
+
+
+def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
+    """A sentence for each stretch of frames whose images contradict how the camera moved a moment before.
+
+    Frames no more than MAX_GAP_FRAMES apart belong together.
+    """
+    if frames is None:
+        return []
+    stretches: list[list[int]] = []
+    for number in frames.numbers[frames.is_step_doubtful]:
+        if stretches and number - stretches[-1][-1] <= MAX_GAP_FRAMES:
+            stretches[-1].append(int(number))
+        else:
+            stretches.append([int(number)])
+    return [_doubt_of(stretch, sensor) for stretch in stretches]
+
+
+def _doubt_of(stretch: list[int], sensor: str) -> str:
+    where = f"at frame {stretch[0]}" if len(stretch) == 1 else f"between frames {stretch[0]} and {stretch[-1]}"
+    times = "once" if len(stretch) == 1 else f"{len(stretch)} times"
+    if sensor == "mono":
+        what, consequence = "The scale may have slipped", "what follows may lie on another scale"
+    else:
+        what, consequence = "The estimated motion is doubtful", "poses there may be wrong"
+    return f"{what} {where}: the images contradicted {times} how the camera moved a moment before; {consequence}."
 
 
 def _read_evaluation(folder: Path) -> dict[str, Any]:

@@ -1,0 +1,44 @@
+"""What the summary of a run says where the scale of the map is in doubt."""
+
+import numpy as np
+
+from tessera_cli.runs.run_folder import Frames
+from tessera_cli.runs.summary import scale_warnings
+
+
+def _frames(num: int, doubtful: list[int]) -> Frames:
+    figures = np.zeros(num)
+    return Frames(
+        times_s=0.1 * np.arange(num),
+        states=["tracked"] * num,
+        pose_time_ms=figures,
+        latency_ms=figures,
+        map_wait_ms=figures,
+        matches=figures,
+        inliers=figures,
+        landmarks=figures,
+        is_keyframe=figures > 0,
+        is_step_doubtful=np.isin(np.arange(num), doubtful),
+        numbers=np.arange(num),
+    )
+
+
+def test_nothing_is_said_where_nothing_is_doubtful() -> None:
+    assert scale_warnings(None, "mono") == []
+    assert scale_warnings(_frames(100, []), "mono") == []
+
+
+def test_doubtful_frames_near_each_other_are_one_stretch() -> None:
+    (sentence,) = scale_warnings(_frames(400, [337, 344, 349]), "mono")
+    assert sentence.startswith("The scale may have slipped between frames 337 and 349: ")
+    assert "3 times" in sentence
+
+
+def test_doubts_far_apart_are_told_by_themselves() -> None:
+    first, second = scale_warnings(_frames(400, [10, 332]), "mono")
+    assert "at frame 10:" in first and "at frame 332:" in second
+
+
+def test_with_a_baseline_it_is_the_motion_that_is_in_doubt() -> None:
+    (sentence,) = scale_warnings(_frames(100, [50, 52]), "stereo")
+    assert sentence.startswith("The estimated motion is doubtful between frames 50 and 52: ")
