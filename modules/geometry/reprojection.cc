@@ -10,10 +10,10 @@ Eigen::Vector3d ReprojectionResidual(const CameraCalibration& calibration, doubl
   const double disparity = calibration.fx_px * baseline_m * inverse_z;
   const double weight = 1.0 / observation.sigma_px;
   double third = 0.0;
-  if (observation.disparity_sigma_px > 0.0) {
-    third = (observation.pixel_px.x() - disparity - observation.right_x_px) / observation.disparity_sigma_px;
-  } else if (observation.has_right()) {
-    third = weight * (u - disparity - observation.right_x_px);
+  if (observation.has_right()) {
+    third = observation.disparity_sigma_px > 0.0
+                ? (observation.pixel_px.x() - disparity - observation.right_x_px) / observation.disparity_sigma_px
+                : weight * (u - disparity - observation.right_x_px);
   }
   return {weight * (u - observation.pixel_px.x()), weight * (v - observation.pixel_px.y()), third};
 }
@@ -30,7 +30,8 @@ Reprojection Reproject(const CameraCalibration& calibration, double baseline_m, 
   const double fy = calibration.fy_px * inverse_z / observation.sigma_px;
   result.by_point.row(0) << fx, 0.0, -fx * x;
   result.by_point.row(1) << 0.0, fy, -fy * y;
-  if (observation.disparity_sigma_px > 0.0) {
+  // disparity = fx baseline / z, of which the residual has the negative
+  if (observation.has_right() && observation.disparity_sigma_px > 0.0) {
     const double per_z = calibration.fx_px * inverse_z / observation.disparity_sigma_px;
     result.by_point.row(2) << 0.0, 0.0, per_z * baseline_m * inverse_z;
   } else if (observation.has_right()) {

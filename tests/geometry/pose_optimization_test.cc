@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+#include <vector>
+
 #include "support/matchers.h"
 #include "support/synthetic_views.h"
 
@@ -16,7 +20,7 @@ TEST_P(OptimizePoseTest, RecoversThePoseAndNamesTheOutliers) {
   const auto points = MakePoints(Scene::kGeneral, truth, 200);
   std::vector<PoseObservation> observations;
   for (size_t i = 0; i < points.size(); ++i) {
-    observations.push_back({points[i], SeePoint(truth * points[i], GetParam() && i % 3 > 0)});
+    observations.push_back({.point_in_world = points[i], .seen = SeePoint(truth * points[i], GetParam() && i % 3 > 0)});
     if (i % 5 == 0) observations.back().seen.pixel_px += Eigen::Vector2d(25.0, -40.0);
   }
   Eigen::Matrix<double, 6, 1> error;
@@ -34,7 +38,7 @@ TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
   const Rigid3 truth{ExpSO3({0.02, -0.1, 0.03}), {0.4, -0.2, 0.6}};
   std::vector<PoseObservation> observations;
   for (const Eigen::Vector3d& point : MakePoints(Scene::kGeneral, truth, 100)) {
-    observations.push_back({point, SeePoint(truth * point, true)});
+    observations.push_back({.point_in_world = point, .seen = SeePoint(truth * point, true)});
   }
   const auto cost = [&](const Eigen::Matrix<double, 6, 1>& delta) {
     double sum = 0.0;
@@ -50,6 +54,106 @@ TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
     const double curvature = (cost(step) + cost(-step) - 2.0 * cost(step - step)) / 1e-8;
     EXPECT_NEAR(curvature / result.information(axis, axis), 1.0, 1e-3) << axis;
   }
+}
+
+// Points that a first camera, at the origin, has placed by a triangulation with parallax noise, and what a second one
+// sees of them: some are known well, and of others hardly more than the direction.
+struct UncertainScene {
+  std::vector<PoseObservation> observations;
+  Rigid3 truth;  // camera_from_world of the second
+
+  // Says that the points stand where they don't.
+  void MakeExact() {
+    for (PoseObservation& o : observations) o.depth_sigma_in_world.setZero();
+  }
+  PoseOptimizationResult Optimize(const PoseOptimizationOptions& options = {}) const {
+    return OptimizePose(MakeCamera(), 0.0, observations, truth, options);
+  }
+};
+
+constexpr double kInverseDepthSigma = 0.008;  // 1/m: 3 % of the distance at 4 m, 20 % at 25 m
+
+UncertainScene MakeUncertainScene(unsigned seed) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  UncertainScene scene{.observations = {}, .truth = {ExpSO3({0.01, -0.02, 0.005}), {-0.25, 0.0, -0.1}}};
+  for (const Eigen::Vector3d& point : MakePoints(Scene::kGeneral, scene.truth, 300)) {
+    const double inverse = 1.0 / point.norm(), measured = inverse + kInverseDepthSigma * normal(generator);
+    const Eigen::Vector3d estimate = point.normalized() / measured;
+    PoseObservation o{estimate, -estimate * (kInverseDepthSigma / measured), SeePoint(scene.truth * point, false)};
+    o.seen.sigma_px = 0.7;
+    const double dx = normal(generator), dy = normal(generator);
+    o.seen.pixel_px += o.seen.sigma_px * Eigen::Vector2d(dx, dy);
+    scene.observations.push_back(o);
+  }
+  return scene;
+}
+
+// Center of the camera along the true motion, as a share of it.
+double ShareOfMotion(const Rigid3& camera_from_world, const Rigid3& truth) {
+  const Eigen::Vector3d moved = truth.Inverse().translation;
+  return camera_from_world.Inverse().translation.dot(moved) / moved.squaredNorm();
+}
+
+// Regression dilution: taken as exact, points with wrong depths make the motion come out too short.
+TEST(OptimizePose, WrongDepthsDontShortenTheMotion) {
+  constexpr int kNumDraws = 100;
+  double sum = 0.0, sum_of_squares = 0.0, sum_if_exact = 0.0;
+  for (unsigned seed = 0; seed < kNumDraws; ++seed) {
+    UncertainScene scene = MakeUncertainScene(seed);
+    const double share = ShareOfMotion(scene.Optimize().camera_from_world, scene.truth);
+    sum += share;
+    sum_of_squares += share * share;
+    scene.MakeExact();
+    sum_if_exact += ShareOfMotion(scene.Optimize().camera_from_world, scene.truth);
+  }
+  const double mean = sum / kNumDraws;
+  const double sigma_of_mean = std::sqrt((sum_of_squares / kNumDraws - mean * mean) / kNumDraws);
+  EXPECT_NEAR(mean, 1.0, 3.0 * sigma_of_mean);
+  EXPECT_LT(sum_if_exact / kNumDraws, 1.0 - 10.0 * sigma_of_mean);
+}
+
+// Mean over draws of the normalized estimation error squared: 6, the degrees of freedom, if the information is true.
+double MeanNees(const PoseOptimizationOptions& options, int num_draws, bool is_exact) {
+  double sum = 0.0;
+  for (int seed = 0; seed < num_draws; ++seed) {
+    UncertainScene scene = MakeUncertainScene(static_cast<unsigned>(seed));
+    if (is_exact) scene.MakeExact();
+    const PoseOptimizationResult result = scene.Optimize(options);
+    const Rigid3 error = result.camera_from_world * scene.truth.Inverse();
+    Eigen::Matrix<double, 6, 1> tangent;
+    tangent << error.translation, LogSO3(error.rotation);
+    sum += tangent.dot(result.information * tangent);
+  }
+  return sum / num_draws;
+}
+
+TEST(OptimizePose, TheInformationSaysHowWrongThePoseIs) {
+  constexpr int kNumDraws = 200;
+  const double band = 1.96 * std::sqrt(2.0 * 6.0 / kNumDraws);  // 95 % of chi-square, as a normal distribution
+  EXPECT_NEAR(MeanNees({.num_rounds = 1}, kNumDraws, false), 6.0, band);
+  // Rounds of sorting lose the twentieth of good observations that chi-square calls wrong, and those that are left look
+  // better than they are: (1 - 0.05) / 0.80, a fifth, in the limit of many rounds.
+  EXPECT_NEAR(MeanNees({}, kNumDraws, false), 6.0, band + 6.0 * 0.19);
+  EXPECT_GT(MeanNees({}, kNumDraws, true), 5.0 * 6.0) << "depths that are taken as exact: far too sure of itself";
+}
+
+// What a dozen points of this depth, each known up to a share of its distance, say of the pose.
+Eigen::Matrix<double, 6, 6> InformationOfPoints(double depth, double relative_sigma) {
+  std::vector<PoseObservation> observations;
+  for (const double x : {-0.3, -0.1, 0.2, 0.3}) {
+    for (const double y : {-0.2, 0.0, 0.1}) {
+      const Eigen::Vector3d point = depth * Eigen::Vector3d(x, y, 1.0);
+      observations.push_back({point, -relative_sigma * point, SeePoint(point, false)});
+    }
+  }
+  return OptimizePose(MakeCamera(), 0.0, observations, {}, {}).information;
+}
+
+TEST(OptimizePose, AFarPointHoldsTheRotationAndSaysLittleOfTheTranslation) {
+  const Eigen::Matrix<double, 6, 6> near = InformationOfPoints(5.0, 0.02), far = InformationOfPoints(500.0, 1.0);
+  for (int axis = 3; axis < 6; ++axis) EXPECT_GT(far(axis, axis), 0.9 * near(axis, axis)) << axis;
+  for (int axis = 0; axis < 3; ++axis) EXPECT_LT(far(axis, axis), 1e-3 * near(axis, axis)) << axis;
 }
 
 TEST(OptimizePose, TooFewPointsLeaveThePose) {

@@ -38,6 +38,18 @@ TEST(KeypointMeasurement, DepthIsCarriedAsARightColumn) {
   EXPECT_NEAR(rgbd.pixel_px.x() - rgbd.right_x_px, 500 * kRgbdBaseline / kPoint.z(), 1e-4);
 }
 
+// The depth sensor measures as exactly on every level; a stereo pair's right column is found like the left one.
+TEST(KeypointMeasurement, ADepthSensorsDisparityHasASigmaOfItsOwn) {
+  for (const uint8_t level : {uint8_t{0}, uint8_t{5}}) {
+    EXPECT_EQ(SeenAt(FrameOf(SensorType::kRgbd, level), 0).disparity_sigma_px, kRgbdDisparitySigmaPx);
+    EXPECT_EQ(SeenAt(FrameOf(SensorType::kStereo, level), 0).disparity_sigma_px, 0.0);
+    EXPECT_EQ(SeenAt(FrameOf(SensorType::kMono, level), 0).disparity_sigma_px, 0.0);
+  }
+  FeatureFrame without_depth = FrameOf(SensorType::kRgbd);
+  without_depth.keypoints[0].depth_m = 0.0F;
+  EXPECT_EQ(SeenAt(without_depth, 0).disparity_sigma_px, 0.0);
+}
+
 TEST(KeypointMeasurement, ARightColumnThatMakesNoSenseCountsAsNone) {
   FeatureFrame frame = FrameOf(SensorType::kStereo);
   for (const float right_x_px : {-1.0F, frame.keypoints[0].x_px, frame.keypoints[0].x_px + 1.0F}) {

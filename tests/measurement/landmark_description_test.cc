@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "map/map_editor.h"
+#include "measurement/keypoint_measurement.h"
 
 namespace tessera {
 namespace {
@@ -31,6 +34,98 @@ TEST(LandmarkDescription, FollowsFromTheObservations) {
   EXPECT_NEAR(landmark.max_distance, std::sqrt(101.0) * 1.44, 1e-9);
   EXPECT_NEAR(landmark.max_distance / landmark.min_distance, std::pow(1.2, 7), 1e-9);
   EXPECT_EQ(landmark.descriptor, (Descriptor{0x0F, 0, 0, 0}));
+}
+
+// A landmark 10 m ahead of cameras at these positions, which look along z; they see it where it stands.
+class SeenLandmark {
+ public:
+  explicit SeenLandmark(const std::vector<Eigen::Vector3d>& cameras, uint8_t level = 0,
+                        SensorType sensor = SensorType::kMono, double depth = 10.0) {
+    MapEditor editor(map_);
+    id_ = editor.AddLandmark({.position_in_world = {0.0, 0.0, depth}});
+    for (const Eigen::Vector3d& camera : cameras) {
+      auto features = std::make_shared<FeatureFrame>();
+      features->calibration = {.sensor = sensor, .width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500};
+      const Eigen::Vector3d in_camera = Eigen::Vector3d(0.0, 0.0, depth) - camera;
+      const Eigen::Vector2d pixel = features->calibration.Project(in_camera);
+      features->keypoints = {
+          {.x_px = static_cast<float>(pixel.x()), .y_px = static_cast<float>(pixel.y()), .level = level}};
+      if (sensor == SensorType::kRgbd) features->keypoints[0].depth_m = static_cast<float>(in_camera.z());
+      features->descriptors.resize(1);
+      const KeyframeId keyframe{map_.keyframes().end_id()};
+      editor.AddKeyframe(keyframe, {keyframe.value - 1}, {1.0, Eigen::Quaterniond::Identity(), camera}, features);
+      editor.AddObservation(id_, {keyframe, 0});
+    }
+  }
+  Landmark Describe() const { return DescribeMovedLandmark(map_, id_); }
+  double DepthSigma() const { return Describe().depth_sigma; }
+
+ private:
+  Map map_;
+  LandmarkId id_;
+};
+
+// Two cameras, a baseline apart, see the depth of a point between them up to  z^2 / (f baseline) sigma_px sqrt(2).
+TEST(DepthSigma, IsThatOfATriangulation) {
+  const double expected = 10.0 * 10.0 / (500.0 * 1.0) * kKeypointSigmaPx * std::sqrt(2.0);
+  EXPECT_NEAR(SeenLandmark({{-0.5, 0, 0}, {0.5, 0, 0}}).DepthSigma() / expected, 1.0, 0.01);
+}
+
+TEST(DepthSigma, FallsWithTheParallax) {
+  const double narrow = SeenLandmark({{-0.2, 0, 0}, {0.2, 0, 0}}).DepthSigma();
+  const double wide = SeenLandmark({{-0.8, 0, 0}, {0.8, 0, 0}}).DepthSigma();
+  EXPECT_NEAR(narrow / wide, 4.0, 0.1);
+}
+
+TEST(DepthSigma, FallsWithTheNumberOfObservers) {
+  const Eigen::Vector3d left(-0.5, 0, 0), right(0.5, 0, 0);
+  const double of_two = SeenLandmark({left, right}).DepthSigma();
+  EXPECT_NEAR(SeenLandmark({left, right, left, right}).DepthSigma(), of_two / std::sqrt(2.0), 1e-9);
+  EXPECT_NEAR(SeenLandmark({left, right, left, right, left, right, left, right}).DepthSigma(), of_two / 2.0, 1e-9);
+}
+
+TEST(DepthSigma, GrowsWithTheKeypointsNoise) {
+  const std::vector<Eigen::Vector3d> cameras{{-0.5, 0, 0}, {0.5, 0, 0}};
+  EXPECT_NEAR(SeenLandmark(cameras, 2).DepthSigma(), 1.44 * SeenLandmark(cameras, 0).DepthSigma(), 1e-9);
+}
+
+// Of a point that was seen from one side only, nothing but the direction is known: its depth is anyone's guess.
+TEST(DepthSigma, IsTheDistanceAtMost) {
+  EXPECT_DOUBLE_EQ(SeenLandmark({{0, 0, 0}}).DepthSigma(), 10.0);
+  EXPECT_DOUBLE_EQ(SeenLandmark({{0, 0, 0}, {0, 0, 0}}).DepthSigma(), 10.0);
+  EXPECT_DOUBLE_EQ(SeenLandmark({{-1e-3, 0, 0}, {1e-3, 0, 0}}).DepthSigma(), Eigen::Vector3d(1e-3, 0, 10.0).norm());
+  EXPECT_EQ(DepthSigma(0.0, 7.0), 7.0);
+  EXPECT_EQ(DepthSigma(4.0, 7.0), 0.5);
+}
+
+TEST(DepthSigma, ACameraThatTheLandmarkStandsBehindSaysNothing) {
+  const Landmark landmark = SeenLandmark({{-0.5, 0, 0}, {0.5, 0, 0}}).Describe();
+  FeatureFrame features;
+  features.calibration = {.width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500};
+  features.keypoints.resize(1);
+  const Rigid3 ahead{Eigen::Quaterniond::Identity(), {0.0, 1.0, 20.0}}, behind{ahead.rotation, {0.0, 1.0, 0.0}};
+  EXPECT_EQ(DepthInformation(features, 0, ahead, landmark), 0.0);
+  EXPECT_GT(DepthInformation(features, 0, behind, landmark), 0.0);
+}
+
+// One depth of a depth camera fixes it up to the disparity's own sigma, whatever the keypoint's level.
+TEST(DepthSigma, OfADepthSensorIsThatOfItsDisparity) {
+  for (const double depth : {1.0, 3.0}) {
+    const double expected = depth * depth / (500.0 * kRgbdBaseline) * kRgbdDisparitySigmaPx;
+    for (const uint8_t level : {uint8_t{0}, uint8_t{4}}) {
+      EXPECT_NEAR(SeenLandmark({{0, 0, 0}}, level, SensorType::kRgbd, depth).DepthSigma() / expected, 1.0, 1e-6);
+    }
+  }
+}
+
+TEST(InWorld, AllLengthsFollowTheScale) {
+  const Sim3 world_from_keyframe{2.5, Eigen::Quaterniond(ExpSO3({0.1, 0.2, -0.3})), {1.0, 2.0, 3.0}};
+  const Landmark before = SeenLandmark({{-0.5, 0, 0}, {0.5, 0, 0}}).Describe();
+  const Landmark after = InWorld(world_from_keyframe, before);
+  EXPECT_DOUBLE_EQ(after.depth_sigma, 2.5 * before.depth_sigma);
+  EXPECT_DOUBLE_EQ(after.min_distance, 2.5 * before.min_distance);
+  EXPECT_DOUBLE_EQ(after.max_distance, 2.5 * before.max_distance);
+  EXPECT_NEAR(after.normal.norm(), 1.0, 1e-12);
 }
 
 }  // namespace
