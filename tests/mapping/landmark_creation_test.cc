@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "map/map_editor.h"
+#include "measurement/keypoint_measurement.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 
@@ -30,6 +33,25 @@ class PartlyKnownMap {
   int NumMixed() const { return planted_.NumMixed(map()); }
   size_t PointOf(LandmarkId id) const { return planted_.PointOf(map().ObservationsOf(id).front()); }
   Eigen::Vector3d Truth(LandmarkId id) const { return world_.point(PointOf(id)); }
+  // Between the views of a landmark's two observers, and its noise, rad.
+  double Parallax(LandmarkId id) const {
+    const std::vector<Observation>& seen = map().ObservationsOf(id);
+    return std::acos(RayOf(seen[0]).dot(RayOf(seen[1])));
+  }
+  double ParallaxSigma(LandmarkId id) const {
+    const std::vector<Observation>& seen = map().ObservationsOf(id);
+    return std::hypot(Seen(seen[0]).sigma_px, Seen(seen[1]).sigma_px) / world_.calibration().fx_px;
+  }
+  // By which the camera turned from the first keyframe to the last, rad.
+  double Turn() const {
+    return planted_.Truth({0}).rotation.angularDistance(planted_.Truth({map().keyframes().end_id() - 1}).rotation);
+  }
+  // Landmarks that the last keyframe sees.
+  size_t NumKnown() const {
+    const auto& landmarks = map().FindKeyframe({map().keyframes().end_id() - 1})->landmarks;
+    return static_cast<size_t>(
+        std::count_if(landmarks.begin(), landmarks.end(), [](LandmarkId id) { return id.valid(); }));
+  }
 
   template <class Create>
   std::vector<LandmarkId> Run(const Create& create, const CreationOptions& options = {}) {
@@ -40,6 +62,14 @@ class PartlyKnownMap {
   }
 
  private:
+  PixelObservation Seen(const Observation& seen) const {
+    return SeenAt(*map().FindKeyframe(seen.keyframe)->features, seen.keypoint);
+  }
+  Eigen::Vector3d RayOf(const Observation& seen) const {
+    const Keyframe& keyframe = *map().FindKeyframe(seen.keyframe);
+    return keyframe.world_from_camera.rotation * world_.calibration().Ray(Seen(seen).pixel_px).normalized();
+  }
+
   SyntheticWorld world_;
   PlantedMap planted_;
 };
@@ -56,9 +86,45 @@ TEST(CreateFromPairs, TwoViewsOfAFreePointBecomeALandmarkWhereThePointIs) {
   }
 }
 
-TEST(CreateFromPairs, APairNeedsParallax) {
+// Of the keypoints by their noise; 3 sigma are the default.
+TEST(CreateFromPairs, APairNeedsParallaxThatStandsOutOfTheNoise) {
+  size_t num_before = 1000;
+  for (const double min_parallax_sigmas : {3.0, 6.0, 12.0}) {
+    PartlyKnownMap world(SensorType::kMono, {0, 3});
+    const CreationOptions options{.min_parallax_sigmas = min_parallax_sigmas, .min_parallax_per_turn = 0.0};
+    const std::vector<LandmarkId> created = world.Run(CreateFromPairs, options);
+    EXPECT_LT(created.size(), num_before);
+    EXPECT_GT(created.size(), 10U);
+    num_before = created.size();
+    for (const LandmarkId id : created) EXPECT_GE(world.Parallax(id), min_parallax_sigmas * world.ParallaxSigma(id));
+  }
   PartlyKnownMap world(SensorType::kMono, {0, 3});
-  EXPECT_TRUE(world.Run(CreateFromPairs, {.min_parallax_rad = 0.8}).empty());
+  EXPECT_TRUE(world.Run(CreateFromPairs, {.min_parallax_sigmas = 1000.0}).empty());
+}
+
+// What is systematically wrong in images grows with the way of a keypoint through them.
+TEST(CreateFromPairs, ATurnBetweenTheViewsAsksForMoreParallax) {
+  PartlyKnownMap without(SensorType::kMono, {0, 3}), with(SensorType::kMono, {0, 3});
+  const CreationOptions not_at_all{.min_parallax_per_turn = 0.0, .min_landmarks = 0};
+  const CreationOptions much{.min_parallax_per_turn = 3.0, .min_landmarks = 0};
+  const double limit = 3.0 * with.Turn();
+  const std::vector<LandmarkId> all = without.Run(CreateFromPairs, not_at_all), some = with.Run(CreateFromPairs, much);
+  EXPECT_LT(some.size(), all.size());
+  EXPECT_EQ(some.size(),
+            std::count_if(all.begin(), all.end(), [&](LandmarkId id) { return without.Parallax(id) >= limit; }))
+      << "those with parallax enough, and no others";
+  EXPECT_GT(some.size(), 10U);
+}
+
+TEST(CreateFromPairs, AKeyframeWithFewLandmarksGetsThemInSpiteOfTheTurn) {
+  PartlyKnownMap rich(SensorType::kMono, {0, 3}), poor(SensorType::kMono, {0, 3}), all(SensorType::kMono, {0, 3});
+  const CreationOptions not_at_all{.min_parallax_per_turn = 0.0};
+  CreationOptions so_much{.min_parallax_per_turn = 100.0};
+  const size_t num_known = poor.NumKnown();
+  so_much.min_landmarks = static_cast<int>(num_known);
+  EXPECT_TRUE(rich.Run(CreateFromPairs, so_much).empty()) << "it has as many as it needs";
+  so_much.min_landmarks = static_cast<int>(num_known) + 1;
+  EXPECT_EQ(poor.Run(CreateFromPairs, so_much).size(), all.Run(CreateFromPairs, not_at_all).size());
 }
 
 TEST(CreateFromPairs, KeyframesAtTheSamePositionAreNotSearched) {
@@ -113,7 +179,9 @@ TEST(CreateFromDepth, MonoKeypointsHaveNone) {
 TEST(CreationOptions, OutOfRangeIsRefused) {
   EXPECT_THAT(CreationOptions{}.Check(), IsSuccess());
   EXPECT_THAT(CreationOptions{.max_neighbors = 0}.Check(), IsFailure(HasSubstr("neighbor")));
-  EXPECT_THAT(CreationOptions{.min_parallax_rad = 0.0}.Check(), IsFailure(HasSubstr("parallax")));
+  EXPECT_THAT(CreationOptions{.min_parallax_sigmas = 0.0}.Check(), IsFailure(HasSubstr("parallax")));
+  EXPECT_THAT(CreationOptions{.min_parallax_per_turn = -0.1}.Check(), IsFailure(HasSubstr("parallax")));
+  EXPECT_THAT(CreationOptions{.min_parallax_per_turn = 0.0}.Check(), IsSuccess());
   EXPECT_THAT(CreationOptions{.max_hamming = 257}.Check(), IsFailure(HasSubstr("256")));
 }
 
