@@ -39,6 +39,7 @@ struct Layout<map_landmark_t> {
     fields(message.max_distance, landmark.max_distance);
     fields(message.descriptor, landmark.descriptor);
     fields.Check(changed.id.valid(), "a landmark's number is negative");
+    fields.Check(landmark.depth_sigma >= 0.0, "a landmark's depth sigma is negative");
   }
 };
 

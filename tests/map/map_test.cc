@@ -93,6 +93,14 @@ TEST(Map, TheHashCoversScalesAndClosedLoops) {
   EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.closed_loops.clear(); }));
 }
 
+TEST(Map, TheHashCoversEveryNumberOfALandmark) {
+  for (double Landmark::* const number : {&Landmark::depth_sigma, &Landmark::min_distance, &Landmark::max_distance}) {
+    EXPECT_TRUE(IsNoticed([number](MapDelta& delta) { delta.changed_landmarks[0].landmark.*number += 1e-12; }));
+  }
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.changed_landmarks[0].landmark.position_in_world.y() += 1e-12; }));
+  EXPECT_TRUE(IsNoticed([](MapDelta& delta) { delta.changed_landmarks[0].landmark.normal.z() += 1e-12; }));
+}
+
 // A keyframe with other intrinsics sees other rays.
 TEST(Map, TheHashCoversTheCamera) {
   EXPECT_TRUE(IsNoticed([](MapDelta& delta) {

@@ -255,6 +255,7 @@ namespace {
 Landmark DrawLandmark(std::mt19937& generator) {
   return {.position_in_world = DrawPose(generator).translation,
           .normal = DrawPose(generator).translation.normalized(),
+          .depth_sigma = DrawReal(generator, 0, 9),
           .min_distance = DrawReal(generator, 0, 9),
           .max_distance = DrawReal(generator, 9, 99),
           .descriptor = DrawDescriptor(generator)};

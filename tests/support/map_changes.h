@@ -54,6 +54,7 @@ inline Landmark RandomLandmark(std::mt19937& generator) {
   Landmark landmark;
   landmark.position_in_world = {uniform(generator), uniform(generator), uniform(generator)};
   landmark.normal = Eigen::Vector3d(uniform(generator), uniform(generator), uniform(generator)).normalized();
+  landmark.depth_sigma = 1.0 + uniform(generator);
   landmark.min_distance = 1.0 + uniform(generator);
   landmark.max_distance = 3.0 + uniform(generator);
   landmark.descriptor = {generator(), generator(), generator(), generator()};

@@ -184,6 +184,8 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.moved_keyframes[0].world_from_camera.translation.x() = kNan; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.normal.y() = INFINITY; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.max_distance = kNan; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.depth_sigma = kNan; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.depth_sigma = -1e-9; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.new_observations[0].observation.keypoint = -1; });
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.page = page.num_pages; });
   ExpectRefused<MapSnapshotPage>([](MapSnapshotPage& page) { page.part.removed_keyframes.push_back({1}); });
