@@ -15,7 +15,7 @@
 namespace tessera {
 
 struct BundlePose {
-  KeyframeId id;             // for the caller; the solver goes by index
+  KeyframeId id;             // the solver goes by index; a point's ray comes from the lowest id that sees it
   Rigid3 camera_from_world;  // meters (mono: units of the map)
   bool is_fixed = false;     // held where it is: part of the gauge
 };
@@ -66,7 +66,7 @@ struct BundleOptions {
   // Up to this many free poses the reduced camera system is solved dense, above it sparse. Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
   int max_num_dense_poses = 60;
-  // Solve dense systems with Ceres too, instead of WindowSolver, which takes the same steps in a quarter of the time.
+  // Solve dense systems with Ceres too, instead of WindowSolver, which finds the same minimum in a fraction of the time.
   bool is_always_ceres = false;
 
   // Fails if a value is out of range.

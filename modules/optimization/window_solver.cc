@@ -91,6 +91,16 @@ void WindowSolver::SelectTerms(const std::vector<char>& takes_part) {
     const auto pose = static_cast<size_t>(problem_.observations[i].pose);
     terms_[next[static_cast<size_t>(problem_.observations[i].point)]++] = {i, pose, free_of_pose_[pose]};
   }
+  ray_pose_of_point_.assign(problem_.points.size(), 0);
+  for (size_t point = 0; point < ray_pose_of_point_.size(); ++point) {
+    const auto begin = terms_.begin() + static_cast<ptrdiff_t>(terms_of_point_[point]);
+    const auto end = terms_.begin() + static_cast<ptrdiff_t>(terms_of_point_[point + 1]);
+    if (begin == end) continue;
+    const auto is_older = [this](const Term& a, const Term& b) {
+      return problem_.poses[a.pose].id < problem_.poses[b.pose].id;
+    };
+    ray_pose_of_point_[point] = std::min_element(begin, end, is_older)->pose;
+  }
 }
 
 double WindowSolver::Cost(const State& state) const {
@@ -246,9 +256,9 @@ std::optional<WindowSolver::Step> WindowSolver::SolveStep(double radius) {
   return step;
 }
 
-// From the center of the first camera that sees it.
+// From the center of the oldest camera that sees it, in whatever order the observations are listed.
 Eigen::Vector3d WindowSolver::RayTo(size_t point) const {
-  const size_t pose = terms_[terms_of_point_[point]].pose;
+  const size_t pose = ray_pose_of_point_[point];
   return state_.positions[point] + state_.rotations[pose].transpose() * state_.poses[pose].translation;
 }
 
@@ -257,8 +267,9 @@ Eigen::Vector3d WindowSolver::RayTo(size_t point) const {
 Eigen::Matrix3d WindowSolver::PointDamping(size_t point, double radius) const {
   const Eigen::Vector3d ray = RayTo(point).normalized();
   const double along = ray.dot(v_[point] * ray), aside = 0.5 * (v_[point].trace() - along);
-  Eigen::Matrix3d damping = (std::max(along, kMinDiagonal) - aside) / radius * (ray * ray.transpose());
-  damping.diagonal().array() += aside / radius;
+  const double damped_along = std::max(along, kMinDiagonal), damped_aside = std::max(aside, kMinDiagonal);
+  Eigen::Matrix3d damping = (damped_along - damped_aside) / radius * (ray * ray.transpose());
+  damping.diagonal().array() += damped_aside / radius;
   return damping;
 }
 

@@ -75,6 +75,7 @@ class WindowSolver {
   State state_;
   std::vector<Term> terms_;             // point after point
   std::vector<size_t> terms_of_point_;  // by point: its first term; one more at the end
+  std::vector<size_t> ray_pose_of_point_;
 
   // The linearized problem.
   std::vector<Matrix6d> u_;
