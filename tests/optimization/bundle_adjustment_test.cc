@@ -83,29 +83,69 @@ TEST(AdjustBundle, AllSolversGiveTheSame) {
   }
 }
 
-// Not only the same minimum: the same way there, outliers, constraints and damping included.
-TEST(AdjustBundle, WindowSolverTakesTheStepsOfCeres) {
-  for (const double share : {0.0, 0.5}) {
-    SyntheticBundle bundle = MakeSyntheticBundle({.share_with_right = share, .pixel_noise_px = 1.0, .pose_error = 0.2});
-    for (size_t i = 0; i < bundle.problem.observations.size(); i += 13) {
-      bundle.problem.observations[i].seen.pixel_px += Eigen::Vector2d(30.0, -20.0);
+// One round of WindowSolver or of Ceres, as far as `max_num_iterations` go.
+BundleResult AfterIterations(const BundleProblem& problem, int max_num_iterations, bool is_ceres) {
+  BundleOptions options;
+  options.function_tolerance = 0.0;
+  options.max_num_iterations = max_num_iterations;
+  options.num_rounds = 1;
+  options.is_always_ceres = is_ceres;
+  return AdjustBundle(problem, options).value();
+}
+
+// Points of which the start knows the direction well and the distance hardly: at up to 170 baselines of two poses.
+SyntheticBundle MakeFarBundle(double share_with_right) {
+  return MakeSyntheticBundle({.track_length = 8,
+                              .share_with_right = share_with_right,
+                              .pixel_noise_px = 0.5,
+                              .point_error_m = 0.0,
+                              .inverse_depth_error = 0.5,
+                              .min_depth_m = 30.0,
+                              .depth_range_m = 106.0});
+}
+
+// WindowSolver damps points otherwise than Ceres and moves them by inverse depth, so it takes other steps; outliers and
+// constraints included, these lead to the same minimum. (From farther away they need not: then Ceres sometimes leaves a
+// point behind a camera.)
+TEST(AdjustBundle, WindowSolverEndsAtTheMinimumOfCeres) {
+  const SyntheticBundleOptions near{.pixel_noise_px = 1.0};
+  SyntheticBundleOptions mixed = near, stereo = near;
+  mixed.share_with_right = 0.5;
+  stereo.share_with_right = 1.0;
+  std::vector<SyntheticBundle> bundles{MakeSyntheticBundle(near), MakeSyntheticBundle(mixed),
+                                       MakeSyntheticBundle(stereo), MakeFarBundle(0.0), MakeFarBundle(1.0)};
+  // A depth sensor's, with a sigma of its own.
+  bundles.push_back(MakeSyntheticBundle(stereo));
+  for (BundleObservation& o : bundles.back().problem.observations) o.seen.disparity_sigma_px = 2.0;
+  for (size_t k = 0; k < bundles.size(); ++k) {
+    BundleProblem& problem = bundles[k].problem;
+    for (size_t i = 0; i < problem.observations.size(); i += 13) {
+      problem.observations[i].seen.pixel_px += Eigen::Vector2d(30.0, -20.0);
     }
     for (int i = 2; i < 7; ++i) {
       const auto from = static_cast<size_t>(i);
-      const Rigid3 motion = bundle.camera_from_world[from + 1] * bundle.camera_from_world[from].Inverse();
-      bundle.problem.constraints.push_back({i, i + 1, motion, 1e3 * Eigen::Matrix<double, 6, 6>::Identity()});
+      const Rigid3 motion = bundles[k].camera_from_world[from + 1] * bundles[k].camera_from_world[from].Inverse();
+      problem.constraints.push_back({i, i + 1, motion, 1e3 * Eigen::Matrix<double, 6, 6>::Identity()});
     }
-    for (int iterations = 1; iterations <= 4; ++iterations) {
-      BundleOptions own, ceres;
-      own.max_num_iterations = ceres.max_num_iterations = iterations;
-      own.num_rounds = ceres.num_rounds = 1;
-      ceres.is_always_ceres = true;
-      const auto a = AdjustBundle(bundle.problem, own), b = AdjustBundle(bundle.problem, ceres);
-      ASSERT_TRUE(a && b);
-      EXPECT_NEAR(a->initial_cost / b->initial_cost, 1.0, 1e-12);
-      EXPECT_NEAR(a->final_cost / b->final_cost, 1.0, 1e-4) << iterations;
-      EXPECT_LT(MaxPoseError(*a, b->camera_from_world), 1e-3) << iterations;
-    }
+    const BundleResult own = AfterIterations(problem, 200, false), ceres = AfterIterations(problem, 200, true);
+    EXPECT_NEAR(own.initial_cost / ceres.initial_cost, 1.0, 1e-12) << k;
+    EXPECT_NEAR(own.final_cost / ceres.final_cost, 1.0, 1e-6) << k;
+    EXPECT_LT(MaxPoseError(own, ceres.camera_from_world), 1e-4) << k;
+  }
+}
+
+// Damping by the world's axes holds a far point's depth as firmly as its direction, which is known a thousand times
+// better; and distances, unlike inverse ones, are not linear in what is seen.
+TEST(AdjustBundle, WindowSolverPlacesFarPointsInFewIterations) {
+  for (const double share_with_right : {0.0, 1.0}) {
+    const BundleProblem problem = MakeFarBundle(share_with_right).problem;
+    const double minimum = AfterIterations(problem, 200, true).final_cost;
+    const auto excess = [&](int iterations, bool is_ceres) {
+      return AfterIterations(problem, iterations, is_ceres).final_cost / minimum - 1.0;
+    };
+    EXPECT_LT(excess(2, false), 1e-3);
+    EXPECT_GT(excess(2, true), 0.1);
+    EXPECT_LT(excess(5, false), 0.1 * excess(5, true));
   }
 }
 

@@ -24,6 +24,9 @@ struct SyntheticBundleOptions {
   double pixel_noise_px = 0.0;  // standard deviation
   double pose_error = 0.02;     // of the start, uniform: m, and rad / 5
   double point_error_m = 0.1;
+  double inverse_depth_error = 0.0;  // of the start, uniform: a share of the inverse depth
+  double min_depth_m = 6.0;          // of points in the first camera that sees them
+  double depth_range_m = 20.0;
 };
 
 struct SyntheticBundle {
@@ -85,12 +88,17 @@ inline SyntheticBundle MakeSyntheticBundle(const SyntheticBundleOptions& options
   }
   for (int i = 0; i < options.num_points; ++i) {
     const int first = i % (options.num_poses - options.track_length + 1);
-    const double z = 6.0 + 20.0 * unit(generator);
+    const double z = options.min_depth_m + options.depth_range_m * unit(generator);
     const Eigen::Vector3d ray = UniformVector(generator, 1.0).cwiseProduct(Eigen::Vector3d(0.6, 0.2, 0.0));
     const Eigen::Vector3d in_first = z * (ray + Eigen::Vector3d::UnitZ());
     const Eigen::Vector3d position = bundle.camera_from_world[static_cast<size_t>(first)].Inverse() * in_first;
     bundle.positions_in_world.push_back(position);
-    problem.points.push_back({LandmarkId{i}, position + UniformVector(generator, options.point_error_m)});
+    Eigen::Vector3d start = position + UniformVector(generator, options.point_error_m);
+    if (options.inverse_depth_error > 0.0) {
+      const Eigen::Vector3d center = bundle.camera_from_world[static_cast<size_t>(first)].Inverse().translation;
+      start = center + (start - center) / (1.0 + options.inverse_depth_error * (2.0 * unit(generator) - 1.0));
+    }
+    problem.points.push_back({LandmarkId{i}, start});
     for (int pose = first; pose < first + options.track_length; ++pose) {
       const Eigen::Vector3d in_camera = bundle.camera_from_world[static_cast<size_t>(pose)] * position;
       PixelObservation seen = Observe(problem, in_camera, unit(generator) < options.share_with_right);
