@@ -66,7 +66,8 @@ struct BundleOptions {
   // Up to this many free poses the reduced camera system is solved dense, above it sparse. Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
   int max_num_dense_poses = 60;
-  // Solve dense systems with Ceres too, instead of WindowSolver, which finds the same minimum in a fraction of the time.
+  // Solve dense systems with Ceres too, instead of WindowSolver, which finds the same minimum in a fraction of the
+  // time.
   bool is_always_ceres = false;
 
   // Fails if a value is out of range.
