@@ -66,6 +66,22 @@ struct RemapTable {
                                 cv::Size(camera.width_px, camera.height_px), CV_16SC2, whole, fraction);
   }
 
+  // The same, rounded to whole pixels. cv::convertMaps would cut the fraction off instead.
+  RemapTable Rounded() const {
+    RemapTable rounded;
+    rounded.whole = whole.clone();
+    constexpr int kHalf = cv::INTER_TAB_SIZE / 2;
+    for (int row = 0; row < whole.rows; ++row) {
+      for (int column = 0; column < whole.cols; ++column) {
+        const int both = fraction.at<uint16_t>(row, column);  // y, x in cv::INTER_BITS each
+        auto& pixel = rounded.whole.at<cv::Vec2s>(row, column);
+        pixel[0] = static_cast<int16_t>(pixel[0] + (both % cv::INTER_TAB_SIZE >= kHalf ? 1 : 0));
+        pixel[1] = static_cast<int16_t>(pixel[1] + (both / cv::INTER_TAB_SIZE >= kHalf ? 1 : 0));
+      }
+    }
+    return rounded;
+  }
+
   template <class Pixel>
   Image<Pixel> Apply(Image<Pixel>& image, int type, int interpolation) const {
     Image<Pixel> result(image.width, image.height);
@@ -121,8 +137,7 @@ void Rectifier::PrepareSingle(const CameraRig& rig) {
   calibration_.cy_px = matrix.at<double>(1, 2);
   maps_ = std::make_unique<Maps>();
   maps_->left = RemapTable(rig.left, cv::Mat(), matrix);
-  cv::convertMaps(maps_->left.whole, maps_->left.fraction, maps_->nearest.whole, maps_->nearest.fraction, CV_16SC2,
-                  true);
+  maps_->nearest = maps_->left.Rounded();
 }
 
 // P_left = [f 0 cx 0; 0 f cy 0; 0 0 1 0],  P_right = the same with -f * baseline [px m] at the top right.

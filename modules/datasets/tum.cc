@@ -3,7 +3,10 @@
 //
 // The format holds no calibration. It is taken from the first of: --camera; calibration.yaml or
 // camera.yaml in the folder; the folder's README where it says `fx=... fy=... cx=... cy=...` and `factor N`
-// (counts per meter) or millimeters; the values that the TUM tools take for any Kinect.
+// (counts per meter) or millimeters; what is published for sequences whose folder has its name of the benchmark
+// (published_calibration.h); the values that the TUM tools take for any Kinect.
+//
+// Each depth image must be registered to the color image as the camera gave it, before undistortion.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -14,6 +17,7 @@
 #include "datasets/calibration_file.h"
 #include "datasets/image_file.h"
 #include "datasets/pose_track.h"
+#include "datasets/published_calibration.h"
 #include "datasets/readme_calibration.h"
 #include "datasets/recording.h"
 #include "datasets/text_file.h"
@@ -114,44 +118,76 @@ std::string FindReadme(const fs::path& folder) {
 std::string Describe(const PinholeCamera& camera) {
   std::ostringstream text;
   text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px << " px";
+  if (!camera.distortion.empty()) {
+    text << ", distortion";
+    for (const double coefficient : camera.distortion) text << ' ' << coefficient;
+  }
   return text.str();
 }
 
-// The camera according to the files of the folder; a note names the file.
-void CalibrateFromFolder(const fs::path& folder, const SourceOptions& options, Recording& recording) {
-  CameraRig& rig = recording.rig;
-  std::string file = options.calibration_path;
+struct Evidence {
+  std::string file;    // a calibration file; empty: none
+  std::string readme;  // empty: none
+  std::string readme_text;
+  std::optional<PublishedCalibration> published;
+};
+
+Evidence FindEvidence(const fs::path& folder, const SourceOptions& options, std::vector<std::string>& notes) {
+  Evidence evidence;
+  evidence.file = options.calibration_path;
   for (const char* name : {"calibration.yaml", "camera.yaml"}) {
-    if (file.empty() && fs::is_regular_file(folder / name)) {
-      file = folder / name;
-      recording.notes.push_back("The calibration is taken from " + file + ".");
+    if (evidence.file.empty() && fs::is_regular_file(folder / name)) {
+      evidence.file = folder / name;
+      notes.push_back("The calibration is taken from " + evidence.file + ".");
     }
   }
-  const std::string readme = FindReadme(folder);
-  const std::string text = readme.empty() ? "" : ReadFile(readme);
-  if (!file.empty()) {
-    rig = LoadCalibrationFile(file);
-  } else if (const auto camera = PinholeFromText(text)) {
+  evidence.readme = FindReadme(folder);
+  if (!evidence.readme.empty()) evidence.readme_text = ReadFile(evidence.readme);
+  evidence.published = PublishedTumCalibration(folder);
+  return evidence;
+}
+
+void CalibrateCamera(const fs::path& folder, const Evidence& evidence, Recording& recording) {
+  CameraRig& rig = recording.rig;
+  if (!evidence.file.empty()) {
+    rig = LoadCalibrationFile(evidence.file);
+  } else if (const auto camera = PinholeFromText(evidence.readme_text)) {
     rig.left = *camera;
-    recording.notes.push_back("The calibration is taken from " + readme + ": " + Describe(rig.left) + ".");
+    recording.notes.push_back("The calibration is taken from " + evidence.readme + ": " + Describe(rig.left) + ".");
+  } else if (evidence.published) {
+    rig.left = evidence.published->rig.left;
+    recording.notes.push_back("The calibration is that published for " + evidence.published->name + ": " +
+                              Describe(rig.left) + ".");
   } else {
     rig.left = {.width_px = 640, .height_px = 480, .fx_px = 525.0, .fy_px = 525.0, .cx_px = 319.5, .cy_px = 239.5};
     recording.notes.push_back("Warning: " + folder.string() + " says nothing of its camera; " + Describe(rig.left) +
                               " is assumed, as for any Kinect: give --camera FILE.yaml or put calibration.yaml there.");
   }
-  if (options.sensor != SensorType::kRgbd || rig.depth_unit_m > 0.0 || options.depth_unit_m > 0.0) {
-    return;
-  }
-  rig.depth_unit_m = DepthUnitFromText(text);
-  const bool is_known = rig.depth_unit_m > 0.0;
-  if (!is_known) {
-    rig.depth_unit_m = 1.0 / 5000.0;
+}
+
+void ChooseDepthUnit(const Evidence& evidence, Recording& recording) {
+  std::string origin;
+  double& depth_unit_m = recording.rig.depth_unit_m;
+  if (depth_unit_m = DepthUnitFromText(evidence.readme_text); depth_unit_m > 0.0) {
+    origin = "The depth unit is taken from " + evidence.readme;
+  } else if (evidence.published) {
+    depth_unit_m = evidence.published->rig.depth_unit_m;
+    origin = "The depth unit is that published for " + evidence.published->name;
+  } else {
+    depth_unit_m = 1.0 / 5000.0;
+    origin = "Warning: the depth unit of the TUM sets is assumed";
   }
   std::ostringstream note;
-  note << (is_known ? "The depth unit is taken from " + readme + ": "
-                    : "Warning: the depth unit of the TUM sets is assumed: ")
-       << "1/" << 1.0 / rig.depth_unit_m << " m per count.";
+  note << origin << ": 1/" << 1.0 / depth_unit_m << " m per count.";
   recording.notes.push_back(note.str());
+}
+
+// The camera according to the files of the folder, or to its name; a note tells which.
+void Calibrate(const fs::path& folder, const SourceOptions& options, Recording& recording) {
+  const Evidence evidence = FindEvidence(folder, options, recording.notes);
+  CalibrateCamera(folder, evidence, recording);
+  const bool is_known = recording.rig.depth_unit_m > 0.0 || options.depth_unit_m > 0.0;
+  if (options.sensor == SensorType::kRgbd && !is_known) ChooseDepthUnit(evidence, recording);
 }
 
 void ReadGroundTruth(const fs::path& path, Recording& recording) {
@@ -184,7 +220,7 @@ Recording LoadTum(const std::string& folder, const SourceOptions& options) {
   }
   Recording recording;
   recording.times_path = fs::path(folder) / "rgb.txt";
-  CalibrateFromFolder(folder, options, recording);
+  Calibrate(folder, options, recording);
   OpenImages(folder, options.sensor, recording);
   ReadGroundTruth(fs::path(folder) / "groundtruth.txt", recording);
   return recording;

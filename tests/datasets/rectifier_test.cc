@@ -119,6 +119,33 @@ TEST(Rectifier, NeverMixesDepths) {
   }
 }
 
+// Color and depth of a new pixel come from the same place of the old images, and depth from the nearest pixel there.
+TEST(Rectifier, DepthStaysOnTheColorImage) {
+  CameraRig rig = WideAnglePair();
+  rig.depth_unit_m = 0.001;
+  const Rectifier rectifier(rig, SensorType::kRgbd);
+  const CameraCalibration& calibration = rectifier.calibration();
+  DepthImage columns(752, 480), rows(752, 480);
+  for (int y = 0; y < 480; ++y) {
+    for (int x = 0; x < 752; ++x) {
+      columns.row(y)[x] = static_cast<uint16_t>(x);
+      rows.row(y)[x] = static_cast<uint16_t>(y);
+    }
+  }
+  columns = rectifier.Depth(std::move(columns));
+  rows = rectifier.Depth(std::move(rows));
+  const double tolerance_px = 0.5 + 1.0 / 32.0;  // the tables' step
+  for (int y = 0; y < 480; y += 7) {
+    for (int x = 0; x < 752; x += 7) {
+      const Eigen::Vector3d ray((x - calibration.cx_px) / calibration.fx_px,
+                                (y - calibration.cy_px) / calibration.fy_px, 1.0);
+      const Eigen::Vector2d from = ProjectDistorted(rig.left, ray);
+      ASSERT_NEAR(columns.row(y)[x], from.x(), tolerance_px) << x << ' ' << y;
+      ASSERT_NEAR(rows.row(y)[x], from.y(), tolerance_px) << x << ' ' << y;
+    }
+  }
+}
+
 TEST(Rectifier, RefusesExchangedCameras) {
   CameraRig rig = WideAnglePair();
   std::swap(rig.left, *rig.right);

@@ -1,6 +1,8 @@
 #include "datasets/frame_source.h"
+#include "datasets/published_calibration.h"
 #include "datasets/readme_calibration.h"
 #include "support/dataset_folder.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -28,9 +30,9 @@ class TumTest : public testing::Test {
                   "# t tx ty tz qx qy qz qw\n999.990 0 0 0 0 0 0 1\n1000.010 2 4 0 0 0 0 1\n"
                   "1000.033 5 6 7 0.6 0 0 0.8\n1000.5 0 0 0 0 0 0 1\n");
   }
-  SourceOptions Options(SensorType sensor = SensorType::kRgbd) {
+  SourceOptions Options(SensorType sensor = SensorType::kRgbd, const std::string& name = "") {
     SourceOptions options;
-    options.source = "tum:" + folder_.path();
+    options.source = "tum:" + (name.empty() ? folder_.path() : folder_.path(name));
     options.sensor = sensor;
     return options;
   }
@@ -101,6 +103,60 @@ TEST_F(TumTest, TakesTheCalibrationFromReadmeThenFileThenOption) {
   EXPECT_EQ(source->calibration().depth_unit_m, 0.001);  // the file says nothing of depth, the README does
   options.depth_unit_m = 0.01;
   EXPECT_EQ(OpenSource(options)->calibration().depth_unit_m, 0.01);
+}
+
+// A name of the benchmark, as a link to the same files.
+TEST_F(TumTest, FoldersOfTheBenchmarkBringTheirPublishedCalibration) {
+  std::filesystem::create_directory_symlink(folder_.path(), folder_.path("rgbd_dataset_freiburg3_office"));
+  std::filesystem::create_directory_symlink(folder_.path(), folder_.path("rgbd_dataset_freiburg1_desk"));
+  auto source = OpenSource(Options(SensorType::kRgbd, "rgbd_dataset_freiburg3_office/"));
+  EXPECT_EQ(source->calibration().fx_px, 535.4);
+  EXPECT_EQ(source->calibration().fy_px, 539.2);
+  EXPECT_EQ(source->calibration().cx_px, 320.1);
+  EXPECT_EQ(source->calibration().cy_px, 247.6);
+  EXPECT_EQ(source->calibration().depth_unit_m, 1.0 / 5000.0);
+  EXPECT_NE(Joined(source->notes()).find("published for freiburg3: fx=535.4"), std::string::npos);
+  EXPECT_EQ(Joined(source->notes()).find("Warning"), std::string::npos);
+  EXPECT_EQ(source->Next()->left, ToGray(DatasetFolder::Pattern(640, 480, 0))) << "without distortion";
+
+  source = OpenSource(Options(SensorType::kRgbd, "rgbd_dataset_freiburg1_desk"));
+  EXPECT_NE(Joined(source->notes()).find("distortion 0.2624 -0.9531 -0.0054 0.0026 1.1633"), std::string::npos);
+  EXPECT_NEAR(source->calibration().fx_px / source->calibration().fy_px, 517.3 / 516.5, 1e-12) << "undistorted";
+  const auto frame = source->Next();
+  EXPECT_NE(frame->left, ToGray(DatasetFolder::Pattern(640, 480, 0)));
+  EXPECT_EQ(frame->depth.row(0)[0], 1000) << "it stays whole";
+}
+
+TEST_F(TumTest, OwnCalibrationsWinOverThePublishedOne) {
+  const std::string name = "rgbd_dataset_freiburg2_xyz";
+  std::filesystem::create_directory_symlink(folder_.path(), folder_.path(name));
+  folder_.Write("README", "Depth: factor 1000.");
+  auto source = OpenSource(Options(SensorType::kRgbd, name));
+  EXPECT_NE(Joined(source->notes()).find("published for freiburg2: fx=520.9"), std::string::npos);
+  EXPECT_EQ(source->calibration().depth_unit_m, 0.001) << "the README's";
+  folder_.Write("README", "fx=585 fy=585 cx=320 cy=240");
+  source = OpenSource(Options(SensorType::kRgbd, name));
+  EXPECT_EQ(source->calibration().fx_px, 585.0);
+  EXPECT_EQ(source->calibration().depth_unit_m, 1.0 / 5000.0);
+  folder_.Write("calibration.yaml", "fx_px: 500\nfy_px: 500\ncx_px: 320\ncy_px: 240\n");
+  EXPECT_EQ(OpenSource(Options(SensorType::kRgbd, name))->calibration().fx_px, 500.0);
+  folder_.Write("own.yaml", "fx_px: 501\nfy_px: 501\ncx_px: 320\ncy_px: 240\n");
+  SourceOptions options = Options(SensorType::kRgbd, name);
+  options.calibration_path = folder_.path("own.yaml");
+  EXPECT_EQ(OpenSource(options)->calibration().fx_px, 501.0);
+}
+
+TEST(PublishedCalibration, GoesByTheNameOfTheFolder) {
+  const auto published = PublishedTumCalibration("data/rgbd_dataset_freiburg2_desk/");
+  ASSERT_TRUE(published);
+  EXPECT_EQ(published->name, "freiburg2");
+  EXPECT_EQ(published->rig.left.cy_px, 249.7);
+  EXPECT_EQ(published->rig.left.distortion, (std::vector<double>{0.2312, -0.7849, -0.0033, -0.0001, 0.9172}));
+  EXPECT_THAT(published->rig.Check(SensorType::kRgbd), IsSuccess());
+  for (const char* other : {"rgbd_dataset_freiburg4_desk", "freiburg1_desk", "rgbd_dataset_freiburg1",
+                            "my_rgbd_dataset_freiburg1_desk", "rgbd_dataset_freiburg1_desk/rgb", ""}) {
+    EXPECT_FALSE(PublishedTumCalibration(other)) << other;
+  }
 }
 
 TEST_F(TumTest, BadFilesAreRefused) {
