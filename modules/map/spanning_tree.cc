@@ -10,6 +10,14 @@ KeyframeId RootOf(const Map& map, KeyframeId id) {
   }
 }
 
+std::vector<KeyframeId> Roots(const Map& map) {
+  std::vector<KeyframeId> roots;
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
+    if (!keyframe.parent.valid()) roots.push_back(id);
+  });
+  return roots;
+}
+
 // A tree may be as deep as the map is long, so what was found on one way to the root is not looked for on the next.
 std::vector<KeyframeId> MapPartOf(const Map& map, KeyframeId id) {
   enum class Membership : char { kUnknown, kInside, kOutside };

@@ -10,6 +10,9 @@ namespace tessera {
 // Root of the tree of keyframe `id`: names the map part that the keyframe belongs to.
 KeyframeId RootOf(const Map& map, KeyframeId id);
 
+// The root of every map part, by id.
+std::vector<KeyframeId> Roots(const Map& map);
+
 // All keyframes of that map part, by id.
 std::vector<KeyframeId> MapPartOf(const Map& map, KeyframeId id);
 

@@ -43,7 +43,7 @@ class CorrectionSchedule {
   // Takes these corrections. CanProcess(id) must hold.
   DueCorrections Take(KeyframeId id);
 
-  // The same after the last keyframe: all results of keyframes and the requested adjustment are due.
+  // The same after the last keyframe: all results of keyframes up to `last` and the requested adjustment are due.
   bool CanFinish(KeyframeId last) const;
   DueCorrections TakeAll(KeyframeId last);
   // Number of the delta whose requested adjustment has not been taken; nullopt: there is none.

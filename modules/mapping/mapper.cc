@@ -90,10 +90,12 @@ std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
   const bool has_moved = ApplyDue(due, {last.value + 1}, editor);
   // Keyframes that came after the last adjustment was requested take part in another one.
   wants_adjustment_ |= last_asked_.valid() && last_asked_ < last;
+  wants_adjustment_ |= options_.polishes && !is_polish_asked_;
   if (!has_moved && !wants_adjustment_) return std::nullopt;
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(last);
   delta.asks_adjustment = AskForAdjustment(last);
+  is_polish_asked_ |= delta.asks_adjustment;
   return delta;
 }
 

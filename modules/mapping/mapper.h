@@ -29,6 +29,7 @@ struct MapperOptions {
   LandmarkCullingOptions landmark_culling;
   KeyframeCullingOptions keyframe_culling;
   LoopFusionOptions loop_fusion;
+  bool polishes = false;  // Finish() asks for a last global adjustment, of every part of the map, also without loops
 
   // Fails if a value is out of range.
   Result<> Check() const;
@@ -47,7 +48,7 @@ class Mapper {
   // Throws std::invalid_argument if the id is not new or the lists do not fit the keypoints.
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
   // Applies the corrections that are due when no further keyframe will come, and asks for a last global adjustment
-  // after loops. nullopt if nothing changes: then the map is final.
+  // after loops, or anyway to polish the map. nullopt if nothing changes: then the map is final.
   std::optional<MapDelta> Finish(const DueCorrections& due);
 
   const Map& map() const { return map_; }
@@ -76,6 +77,7 @@ class Mapper {
   std::optional<AdjustmentBase> base_;  // of the adjustment under way
   KeyframeId last_asked_;               // the last delta that requested an adjustment answers it
   bool is_base_outdated_ = false;       // a loop was closed since: the adjustment is ignored
+  bool is_polish_asked_ = false;
   int64_t num_void_loops_ = 0;
 };
 

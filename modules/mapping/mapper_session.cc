@@ -31,7 +31,7 @@ MapperSession::State MapperSession::state() const {
     return is_ready ? State::kReady : State::kAwaitsCorrections;
   }
   if (!tracker_end_ || num_processed_ < tracker_end_->num_values) return State::kAwaitsKeyframe;
-  return !has_corrections() || schedule_.CanFinish(last_keyframe()) ? State::kEnding : State::kAwaitsCorrections;
+  return !has_corrections() || schedule_.CanFinish(last_loop()) ? State::kEnding : State::kAwaitsCorrections;
 }
 
 Result<MapperActions> MapperSession::Load(const MapDelta& snapshot) {
@@ -107,7 +107,7 @@ MapperActions MapperSession::Process() {
 // What is left of loops and adjustments corrects the map, which may ask for a last adjustment; then it is final.
 MapperActions MapperSession::End() {
   if (has_corrections()) {
-    std::optional<MapDelta> delta = mapper_.Finish(schedule_.TakeAll(last_keyframe()));
+    std::optional<MapDelta> delta = mapper_.Finish(schedule_.TakeAll(last_loop()));
     if (delta) return Publish(std::move(*delta));
   }
   has_finished_ = true;

@@ -70,9 +70,10 @@ class MapperSession {
   const Map& map() const { return mapper_.map(); }
 
  private:
-  KeyframeId last_keyframe() const { return {next_keyframe_.value - 1}; }
+  // The last keyframe that gets a loop result; invalid: there are none.
+  KeyframeId last_loop() const { return options_.closes_loops ? KeyframeId{next_keyframe_.value - 1} : KeyframeId{}; }
   // Whether corrections may still change the map when the last keyframe is in it.
-  bool has_corrections() const { return options_.closes_loops && num_processed_ > 0; }
+  bool has_corrections() const { return (options_.closes_loops || options_.mapper.polishes) && num_processed_ > 0; }
   MapperActions Process();
   MapperActions End();
   MapperActions Publish(MapDelta delta);

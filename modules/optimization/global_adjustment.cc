@@ -43,4 +43,19 @@ GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOp
   return adjustment;
 }
 
+GlobalAdjustment AdjustEveryPart(const Map& map, const BundleOptions& options) {
+  GlobalAdjustment all;
+  all.answers = map.answered();
+  all.delta = map.next_delta() - 1;
+  for (const KeyframeId root : Roots(map)) {
+    const GlobalAdjustment part = AdjustGlobally(map, root, options);
+    all.is_usable |= part.is_usable;
+    all.poses.insert(all.poses.end(), part.poses.begin(), part.poses.end());
+    all.points.insert(all.points.end(), part.points.begin(), part.points.end());
+  }
+  std::ranges::sort(all.poses, {}, &GlobalAdjustment::Pose::id);
+  std::ranges::sort(all.points, {}, &GlobalAdjustment::Point::id);
+  return all;
+}
+
 }  // namespace tessera

@@ -166,6 +166,7 @@ struct MapperSettings {
   bool close_loops = false;
   int loop_delay_keyframes = 0;
   int adjustment_delay_keyframes = 0;
+  bool polish = false;
   std::string load_map;
 
   template <class Self, class Field>
@@ -176,6 +177,7 @@ struct MapperSettings {
     // A loop closer that is started again finds the keyframe in the last snapshot but one.
     field("loop_delay_keyframes", self.loop_delay_keyframes, Range{1, MapArchive::kSnapshotInterval - 1, "keyframes"});
     field("adjustment_delay_keyframes", self.adjustment_delay_keyframes, Range{1, 100'000, "keyframes"});
+    field("polish", self.polish);
     field("load_map", self.load_map);
   }
 };

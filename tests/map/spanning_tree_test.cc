@@ -40,6 +40,8 @@ TEST(SpanningTree, RootsNameTheParts) {
   const Map map = MapOf({-1, 0, 1, 1, -1, 4, 3, 5});
   for (const int64_t id : {0, 1, 2, 3, 6}) EXPECT_EQ(RootOf(map, {id}), KeyframeId{0}) << id;
   for (const int64_t id : {4, 5, 7}) EXPECT_EQ(RootOf(map, {id}), KeyframeId{4}) << id;
+  EXPECT_EQ(Roots(map), (std::vector<KeyframeId>{{0}, {4}}));
+  EXPECT_TRUE(Roots(Map()).empty());
 }
 
 TEST(SpanningTree, HangingATreeBelowAnotherTurnsItsPathRound) {

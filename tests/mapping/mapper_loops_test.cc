@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <set>
 
 #include "map/spanning_tree.h"
 #include "mapping/mapper.h"
@@ -19,7 +20,7 @@ const Sim3 kAway{1.0, ExpSO3({0.0, 0.6, 0.0}), {30.0, 1.0, -3.0}};
 // continue in the second part.
 class LoopMapper : public testing::Test {
  protected:
-  LoopMapper() {
+  explicit LoopMapper(const MapperOptions& options = {}) : mapper_(options) {
     for (int64_t k = 0; k < 6; ++k) planted_.Add(k, {k - 1}, 0);
     for (int64_t k = 6; k < 12; ++k) planted_.Add(k - 6, k == 6 ? KeyframeId{} : KeyframeId{k - 1}, 1, kAway);
     EXPECT_THAT(mapper_.Load(planted_.map().Snapshot()), IsSuccess());
@@ -75,7 +76,7 @@ class LoopMapper : public testing::Test {
 
   SyntheticWorld world_{SensorType::kStereo, 0.3};
   PlantedMap planted_{world_};
-  Mapper mapper_{MapperOptions{}};
+  Mapper mapper_;
   Map replica_;
   int64_t next_ = 12;
   MapDelta delta_;
@@ -177,6 +178,42 @@ TEST_F(LoopMapper, AtTheEndTheMapIsCorrectedOnceMore) {
   EXPECT_THAT(replica_.Apply(*adjusted), IsSuccess());
   EXPECT_EQ(replica_.Sha256Hex(), mapper_.map().Sha256Hex());
   EXPECT_LT(WorstKeyframe(), 0.05);
+}
+
+class PolishingMapper : public LoopMapper {
+ protected:
+  PolishingMapper() : LoopMapper({.polishes = true}) {}
+};
+
+TEST_F(PolishingMapper, AtTheEndEveryPartIsAdjustedOnceThoughNoLoopWasClosed) {
+  EXPECT_FALSE(Step().asks_adjustment);
+  const std::optional<MapDelta> asking = mapper_.Finish({});
+  ASSERT_TRUE(asking.has_value());
+  EXPECT_TRUE(asking->asks_adjustment);
+  EXPECT_TRUE(asking->new_keyframes.empty());
+  EXPECT_THAT(replica_.Apply(*asking), IsSuccess());
+  const GlobalAdjustment adjustment = AdjustEveryPart(replica_, GlobalBundleOptions());
+  const std::optional<MapDelta> polished = mapper_.Finish({{}, adjustment});
+  ASSERT_TRUE(polished.has_value());
+  EXPECT_FALSE(polished->asks_adjustment);
+  std::set<KeyframeId> parts;
+  for (const auto& moved : polished->moved_keyframes) parts.insert(RootOf(replica_, moved.id));
+  EXPECT_EQ(parts, (std::set<KeyframeId>{{0}, {6}}));
+  EXPECT_THAT(replica_.Apply(*polished), IsSuccess());
+  for (const GlobalAdjustment::Pose& pose : adjustment.poses) {
+    EXPECT_THAT(mapper_.map().FindKeyframe(pose.id)->world_from_camera, IsNear(pose.world_from_camera, 1e-9));
+  }
+  EXPECT_FALSE(mapper_.Finish({}).has_value()) << "then the map is final";
+}
+
+TEST_F(PolishingMapper, AfterLoopsOfTheEndItIsAskedForOnce) {
+  Step();
+  const std::optional<MapDelta> corrected = mapper_.Finish({{LoopAt({12}, {5})}, {}});
+  ASSERT_TRUE(corrected.has_value());
+  EXPECT_TRUE(corrected->asks_adjustment);
+  GlobalAdjustment useless;
+  useless.answers = corrected->answers;
+  EXPECT_FALSE(mapper_.Finish({{}, useless}).has_value());
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ using State = MapperSession::State;
 // A session, and what it has said.
 class Stack {
  public:
-  explicit Stack(bool closes_loops = true) : session({.delays = {.loop_keyframes = 2}, .closes_loops = closes_loops}) {}
+  explicit Stack(bool closes_loops = true, bool polishes = false)
+      : session({.mapper = {.polishes = polishes}, .delays = {.loop_keyframes = 2}, .closes_loops = closes_loops}) {}
 
   // Keyframe `id` of a stereo drive comes. Returns the state after all steps that can be taken.
   State Keyframe(int64_t id) {
@@ -105,10 +106,30 @@ TEST(MapperSession, WithoutLoopClosingNothingIsWaitedFor) {
   EXPECT_EQ(stack.End(4), State::kFinished);
 }
 
+TEST(MapperSession, APolishedMapIsFinalWhenTheAdjustmentHasCome) {
+  for (const bool closes_loops : {false, true}) {
+    Stack stack(closes_loops, true);
+    for (int64_t id = 0; id < 4; ++id) {
+      stack.Keyframe(id);
+      if (closes_loops) stack.NoLoopAt(id);
+    }
+    EXPECT_EQ(stack.End(4), State::kAwaitsCorrections);
+    ASSERT_EQ(stack.deltas, (std::vector<int64_t>{0, 1, 2, 3, 4})) << "the last one asks for it";
+    GlobalAdjustment adjustment;
+    adjustment.answers = {3};
+    adjustment.delta = 4;
+    adjustment.is_usable = true;
+    EXPECT_EQ(stack.Receive(adjustment), State::kFinished);
+    EXPECT_EQ(stack.ends.front().num_values, 6) << "deltas";
+  }
+}
+
 TEST(MapperSession, ARunWithoutKeyframesEnds) {
-  Stack stack;
-  EXPECT_EQ(stack.End(0), State::kFinished);
-  EXPECT_EQ(stack.ends.front().num_values, 0);
+  for (const bool polishes : {false, true}) {
+    Stack stack(true, polishes);
+    EXPECT_EQ(stack.End(0), State::kFinished);
+    EXPECT_EQ(stack.ends.front().num_values, 0);
+  }
 }
 
 TEST(MapperSession, AMissingKeyframeIsFatal) {

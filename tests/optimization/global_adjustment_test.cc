@@ -77,11 +77,39 @@ TEST(GlobalAdjustment, MovesOnlyThePartThatWasAskedFor) {
   }
 }
 
+TEST(GlobalAdjustment, EveryPartIsAdjustedAsByItself) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  PlantedMap planted(world);
+  for (int64_t k = 0; k < 4; ++k) planted.Add(k, {k - 1}, 0);
+  for (int64_t k = 4; k < 8; ++k) planted.Add(k - 4, k == 4 ? KeyframeId{} : KeyframeId{k - 1}, 1);
+  planted.Add(9, {}, 2);  // too little to adjust
+  const Map& map = planted.map();
+  const GlobalAdjustment all = AdjustEveryPart(map, GlobalBundleOptions());
+  ASSERT_TRUE(all.is_usable);
+  EXPECT_EQ(all.answers, map.answered());
+  EXPECT_EQ(all.delta, map.next_delta() - 1);
+  ASSERT_EQ(all.poses.size(), 8U);
+  size_t next = 0, num_points = 0;
+  for (const KeyframeId asked : {KeyframeId{2}, KeyframeId{6}}) {
+    const GlobalAdjustment part = AdjustGlobally(map, asked, GlobalBundleOptions());
+    num_points += part.points.size();
+    for (const GlobalAdjustment::Pose& pose : part.poses) {
+      EXPECT_EQ(all.poses[next].id, pose.id);
+      EXPECT_THAT(all.poses[next].world_from_camera, IsNear(pose.world_from_camera, 0.0));
+      ++next;
+    }
+  }
+  EXPECT_EQ(all.points.size(), num_points);
+  EXPECT_TRUE(std::ranges::is_sorted(all.points, {}, &GlobalAdjustment::Point::id));
+}
+
 TEST(GlobalAdjustment, IsNotUsableWithASingleKeyframe) {
   SyntheticWorld world(SensorType::kStereo);
   PlantedMap planted(world);
   planted.Add(0, {});
   EXPECT_FALSE(AdjustGlobally(planted.map(), {0}, GlobalBundleOptions()).is_usable);
+  EXPECT_FALSE(AdjustEveryPart(planted.map(), GlobalBundleOptions()).is_usable);
+  EXPECT_FALSE(AdjustEveryPart(Map(), GlobalBundleOptions()).is_usable);
 }
 
 TEST(GlobalAdjustment, RefusesAKeyframeThatIsNotInTheMap) {

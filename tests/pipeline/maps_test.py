@@ -119,6 +119,7 @@ def test_a_broken_map_file_is_refused_in_one_sentence(
         (["--load-map", "/no/such/map"], "there is no file"),
         (["--save-map", "/no/such/folder/map"], "there is no folder"),
         (["--localize-only"], "needs a map"),
+        (["--localize-only", "--polish"], "--polish has no effect"),
         (["--set", "tracker.localize_only=true"], "--localize-only"),
     ],
 )

@@ -116,6 +116,20 @@ def test_cut_and_shared_out_gives_the_same(tessera: Tessera, sequence: Path, ref
     must_equal(tessera.run(f"kitti:{sequence}", "--extractors", 3, "--tiles", "2x4"), reference_run)
 
 
+def test_a_polish_changes_the_map_at_the_end_and_nothing_before(
+    tessera: Tessera, sequence: Path, reference_run: Finished
+) -> None:
+    """Also where loops are not looked for; the made sequence closes none."""
+    polished = tessera.run(f"kitti:{sequence}", "--no-loop-closing", "--polish").must_end_well()
+    must_equal(tessera.run(f"kitti:{sequence}", "--polish", "--extractors", 1), polished)
+    live = "trajectory_live.txt"
+    assert (polished.folder / live).read_bytes() == (reference_run.folder / live).read_bytes()
+    for key in ("trajectory_sha256", "map_sha256"):
+        assert polished.summary[key] != reference_run.summary[key]
+    assert polished.summary["keyframes"] == reference_run.summary["keyframes"]
+    assert polished.summary["rms_error_m"] < MAX_RMS_ERROR_M
+
+
 def test_an_extractor_that_is_killed_changes_nothing(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start(

@@ -35,6 +35,7 @@ TEST(DefaultSettings, OfTheMapper) {
   EXPECT_EQ(settings.loop_delay_keyframes, options.delays.loop_keyframes);
   EXPECT_EQ(settings.adjustment_delay_keyframes, options.delays.adjustment_keyframes);
   EXPECT_EQ(settings.close_loops, options.closes_loops);
+  EXPECT_EQ(settings.polish, options.mapper.polishes);
 }
 
 TEST(DefaultSettings, OfTheLoopCloser) {

@@ -203,6 +203,30 @@ TEST(LoopPipeline, AMapperAndAnAdjusterThatAreStartedAgainMakeTheSameMap) {
   ExpectSame(run.Finish());
 }
 
+// Without a loop the map keeps its two parts; both are adjusted when the last frame has its pose.
+TEST(LoopPipeline, APolishedMapIsTheSameEachTimeAndTheLiveTrajectoryAsWithout) {
+  const Overrides without_loops = {"mapper.close_loops=false"};
+  const Overrides polished = {"mapper.close_loops=false", "mapper.polish=true"};
+  LoopRun plain("1x1", 1, without_loops), first("1x1", 1, polished), second("2x2", 2, polished);
+  const nlohmann::json plain_figures = plain.Finish(), figures = first.Finish();
+  ASSERT_TRUE(second.Reach(kNumFrames));
+  second.Restart<MapperStage>("mapper");
+  second.Restart<GlobalAdjusterStage>("global_adjuster");
+  const nlohmann::json again = second.Finish();
+  ASSERT_FALSE(plain_figures.is_null() || figures.is_null() || again.is_null());
+  EXPECT_EQ(first.num_usable_adjustments(), 1);
+  EXPECT_EQ(plain.num_usable_adjustments(), 0);
+  EXPECT_EQ(first.folder().Read("trajectory_live.txt"), plain.folder().Read("trajectory_live.txt"));
+  for (const char* file : {"trajectory.txt", "keyframes.txt"}) {
+    EXPECT_NE(first.folder().Read(file), plain.folder().Read(file)) << file;
+  }
+  EXPECT_EQ(figures["keyframes"], plain_figures["keyframes"]);
+  for (const char* key : {"trajectory_sha256", "map_sha256"}) {
+    EXPECT_NE(figures[key], plain_figures[key]) << key;
+    EXPECT_EQ(again[key], figures[key]) << key;
+  }
+}
+
 // The file of the reference run's map, to be loaded.
 std::string LoadMap() {
   EXPECT_FALSE(Reference().is_null());

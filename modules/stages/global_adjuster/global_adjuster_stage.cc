@@ -7,6 +7,7 @@
 namespace tessera {
 GlobalAdjusterStage::GlobalAdjusterStage(StageContext& context)
     : context_(context),
+      polishes_(context.settings().Get<MapperSettings>().polish),
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); },
           [this] {
@@ -20,10 +21,17 @@ Result<> GlobalAdjusterStage::Apply(const MapDelta& delta) {
   TESSERA_RETURN_IF_FAILED(replica_.Apply(delta));
   if (delta.asks_adjustment) {
     const StepTimer timer(context_);
-    adjustments_.Publish(AdjustGlobally(replica_, delta.answers, GlobalBundleOptions()));
+    adjustments_.Publish(Adjust(delta));
     context_.SetValue("adjusted", static_cast<double>(++num_adjusted_));
   }
   return {};
+}
+
+// A change that no new keyframe made comes at the end of the run.
+GlobalAdjustment GlobalAdjusterStage::Adjust(const MapDelta& asks) const {
+  const bool is_polish = polishes_ && asks.new_keyframes.empty();
+  return is_polish ? AdjustEveryPart(replica_, GlobalBundleOptions())
+                   : AdjustGlobally(replica_, asks.answers, GlobalBundleOptions());
 }
 
 }  // namespace tessera

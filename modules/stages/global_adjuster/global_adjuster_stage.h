@@ -13,8 +13,10 @@ class GlobalAdjusterStage {
 
  private:
   Result<> Apply(const MapDelta& delta);
+  GlobalAdjustment Adjust(const MapDelta& asks) const;
 
   StageContext& context_;
+  const bool polishes_;
   Map replica_;
   MapSubscription map_;
   Publisher<GlobalAdjustment> adjustments_;

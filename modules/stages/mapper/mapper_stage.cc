@@ -12,6 +12,7 @@ MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
   MapperSessionOptions options;
   options.mapper.window.max_inner_keyframes = settings.max_inner_keyframes;
   options.mapper.window.max_outer_keyframes = settings.max_outer_keyframes;
+  options.mapper.polishes = settings.polish;
   options.delays.loop_keyframes = settings.loop_delay_keyframes;
   options.delays.adjustment_keyframes = settings.adjustment_delay_keyframes;
   options.closes_loops = settings.close_loops;

@@ -121,6 +121,11 @@ def add_run_options(parser: Parser) -> None:
 
 def _add_map_options(parser: Parser) -> None:
     parser.add_argument("--no-loop-closing", action="store_true", help="don't correct the map where a loop closes")
+    parser.add_argument(
+        "--polish",
+        action="store_true",
+        help="adjust the whole map once more when the run ends, also without loops; trajectory_live.txt stays",
+    )
     parser.add_argument("--load-map", metavar="FILE", help="continue in the map of an earlier run: its map.tessera")
     parser.add_argument("--save-map", metavar="FILE", help="one more copy of the run's map.tessera")
     parser.add_argument(

@@ -17,6 +17,7 @@ RESERVED = {
     "tracker.live": "--live",
     "tracker.replay_log": "replay LOG",
     "mapper.close_loops": "--no-loop-closing",
+    "mapper.polish": "--polish",
     "mapper.load_map": "--load-map FILE",
     "evaluator.save_map": "--save-map FILE",
     "tracker.localize_only": "--localize-only",
@@ -75,6 +76,10 @@ def _bus_assignments(source: Source, port: int) -> list[str]:
 
 def _map_assignments(arguments: Namespace) -> list[str]:
     assignments = ["mapper.close_loops=false"] if arguments.no_loop_closing else []
+    if arguments.polish:
+        if arguments.localize_only:
+            raise UserError("--polish has no effect with --localize-only, which leaves the map unchanged.")
+        assignments.append("mapper.polish=true")
     if arguments.load_map:
         assignments.append(f"mapper.load_map={_existing_file('--load-map', arguments.load_map)}")
     if arguments.localize_only:

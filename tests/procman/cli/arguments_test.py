@@ -49,6 +49,7 @@ def test_arguments_at_fault(tessera: Tessera, arguments: list[Any], word: str) -
         ("evaluator.out_dir=/tmp", "--out"),
         ("camera.source=kitti:/tmp", "SOURCE"),
         ("tracker.live=true", "--live"),
+        ("mapper.polish=true", "--polish"),
         ("tracker.map_delay_frames=0", "map_delay_frames"),
         ("mapper.max_inner_keyframes=0", "mapper"),
     ],
