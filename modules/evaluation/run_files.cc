@@ -63,6 +63,28 @@ Json ToJson(const std::optional<Statistics>& statistics) {
           {"max", statistics->max}};
 }
 
+Json ToJson(const std::vector<PartRecord>& parts) {
+  Json list = Json::array();
+  for (const PartRecord& part : parts) {
+    const auto frame = [](const std::optional<StampedPose>& pose) -> Json {
+      if (!pose) return nullptr;
+      return pose->frame.value;
+    };
+    const auto seconds = [](const std::optional<StampedPose>& pose) -> Json {
+      if (!pose) return nullptr;
+      return 1e-6 * static_cast<double>(pose->utime_us);
+    };
+    list.push_back({{"first_frame", frame(part.first)},
+                    {"last_frame", frame(part.last)},
+                    {"first_timestamp_s", seconds(part.first)},
+                    {"last_timestamp_s", seconds(part.last)},
+                    {"frames", part.num_frames},
+                    {"keyframes", part.num_keyframes},
+                    {"is_main", part.is_main}});
+  }
+  return list;
+}
+
 // The measurements of all frames that have them.
 std::optional<Statistics> SummarizeFrames(const std::vector<FrameRecord>& frames,
                                           std::optional<double> FrameRecord::* measurement) {
@@ -113,6 +135,7 @@ std::string LoopsCsv(const RunRecord& record) {
 std::string RunJson(const RunRecord& record) {
   const FrameCounts counts = record.Counts();
   const std::vector<FrameRecord> frames = record.Frames();
+  const std::vector<PartRecord> parts = record.Parts();
   Json stage_ms = Json::object(), stage_values = Json::object();
   int64_t num_repaired = 0, num_lost = 0;
   for (const auto& [name, figures] : record.stages()) {
@@ -133,6 +156,8 @@ std::string RunJson(const RunRecord& record) {
                      {"loops_closed", record.map().closed_loops().size()},
                      {"keyframes", record.map().keyframes().size()},
                      {"landmarks", record.map().landmarks().size()},
+                     {"map_parts", parts.size()},
+                     {"parts", ToJson(parts)},
                      {"pose_time_ms", ToJson(SummarizeFrames(frames, &FrameRecord::pose_time_ms))},
                      {"latency_ms", ToJson(SummarizeFrames(frames, &FrameRecord::latency_ms))},
                      {"map_wait_ms", ToJson(SummarizeFrames(frames, &FrameRecord::map_wait_ms))},

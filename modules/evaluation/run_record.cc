@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/sha256.h"
+#include "map/spanning_tree.h"
 
 namespace tessera {
 namespace {
@@ -139,6 +140,27 @@ std::vector<StampedPose> RunRecord::Keyframes() const {
     keyframes.push_back({keyframe.features->frame, keyframe.features->utime_us, keyframe.world_from_camera});
   });
   return keyframes;
+}
+
+std::vector<PartRecord> RunRecord::Parts() const {
+  std::vector<PartRecord> parts;
+  std::map<KeyframeId, size_t> part_of;
+  for (const KeyframeId root : Roots(map_)) {
+    const std::vector<KeyframeId> keyframes = MapPartOf(map_, root);
+    for (const KeyframeId id : keyframes) part_of.emplace(id, parts.size());
+    parts.push_back({.num_keyframes = static_cast<int64_t>(keyframes.size())});
+  }
+  for (const auto& [id, pose] : poses_) {
+    const auto part = part_of.find(removed_.Successor(map_, pose.estimate.reference_keyframe));
+    if (pose.estimate.state != TrackingState::kTracked || part == part_of.end()) continue;
+    PartRecord& record = parts[part->second];
+    record.last = FinalPose(pose.estimate);
+    if (!record.first) record.first = record.last;
+    ++record.num_frames;
+  }
+  const auto main = std::ranges::max_element(parts, {}, &PartRecord::num_keyframes);  // the first of several
+  if (main != parts.end()) main->is_main = true;
+  return parts;
 }
 
 std::vector<StampedPose> RunRecord::GroundTruth() const {

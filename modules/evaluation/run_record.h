@@ -43,6 +43,14 @@ struct FrameCounts {
   int64_t relocalizations = 0;    // changes back, into a part of the map that was there before
 };
 
+// A part of the map, and the tracked frames that it places. Poses of two parts can't be compared: nothing joins them.
+struct PartRecord {
+  int64_t num_keyframes = 0;
+  int64_t num_frames = 0;
+  std::optional<StampedPose> first, last;  // of the frames; there may be others of another part between them
+  bool is_main = false;                    // no part has more keyframes (of two that have as many, the older one)
+};
+
 // The latest figures that a stage told.
 struct StageRecord {
   Statistics step_ms;
@@ -84,6 +92,7 @@ class RunRecord {
   // the origin of the world.
   std::vector<Rigid3> PosePerFrame() const;
   std::vector<StampedPose> Keyframes() const;  // of the map
+  std::vector<PartRecord> Parts() const;       // of the map, oldest first
   std::vector<StampedPose> GroundTruth() const;
 
   // Over the exact bits of Trajectory(): frame, time, tx ty tz qx qy qz qw.

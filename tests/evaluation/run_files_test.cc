@@ -153,6 +153,11 @@ TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
   EXPECT_EQ(json["tracking_failures"], 1);
   EXPECT_EQ(json["keyframes"], 1);
   EXPECT_EQ(json["landmarks"], 1);
+  EXPECT_EQ(json["map_parts"], 1);
+  ASSERT_EQ(json["parts"].size(), 1U);
+  EXPECT_EQ(json["parts"][0]["keyframes"], 1);
+  EXPECT_EQ(json["parts"][0]["is_main"], true);
+  EXPECT_TRUE(json["parts"][0]["first_frame"].is_null()) << "no frame was tracked relative to it";
   EXPECT_DOUBLE_EQ(json["map_wait_ms"]["mean"], 2.0);
   EXPECT_DOUBLE_EQ(json["pose_time_ms"]["median"], 4.0);
   EXPECT_DOUBLE_EQ(json["latency_ms"]["max"], 18.0);
@@ -177,6 +182,8 @@ TEST_F(RunFilesTest, AnEmptyRunHasFilesToo) {
   const auto json = nlohmann::json::parse(Read("run.json"));
   EXPECT_EQ(json["frames"], 0);
   EXPECT_TRUE(json["pose_time_ms"].is_null());
+  EXPECT_EQ(json["map_parts"], 0);
+  EXPECT_TRUE(json["parts"].empty());
 }
 
 TEST_F(RunFilesTest, AFolderThatCantBeMadeIsRefused) {

@@ -154,6 +154,40 @@ TEST(RunRecord, FinalPosesFollowTheirKeyframesAlsoWhenTheseAreGone) {
   EXPECT_EQ(record.Keyframes().size(), 1U);
 }
 
+TEST(RunRecord, FramesBelongToThePartThatPlacesThem) {
+  RunRecord record = RecordOf({kInitializing});
+  const auto track = [&](int64_t frame, int64_t reference) {
+    PoseEstimate pose = Pose(frame, kTracked);
+    pose.reference_keyframe = {reference};
+    record.AddPose(pose, frame);
+  };
+  EXPECT_TRUE(record.Parts().empty());
+  Apply(record, NewKeyframe(0, -1, 1, At(0.0)));
+  Apply(record, NewKeyframe(1, -1, 5, At(0.0)));
+  Apply(record, NewKeyframe(2, 1, 6, At(1.0)));
+  Apply(record, NewKeyframe(3, 0, 7, At(1.0)));
+  Apply(record, {.removed_keyframes = {{3}}});
+  Apply(record, NewKeyframe(4, -1, 8, At(1.0)));
+  track(1, 0);
+  track(2, 0);
+  track(5, 1);
+  track(6, 2);
+  track(7, 3);  // was recognized in the first part, by a keyframe that is gone
+  const std::vector<PartRecord> parts = record.Parts();
+  ASSERT_EQ(parts.size(), 3U);
+  EXPECT_EQ(parts[0].num_keyframes, 1);
+  EXPECT_EQ(parts[0].num_frames, 3);
+  EXPECT_EQ(parts[0].first->frame.value, 1);
+  EXPECT_EQ(parts[0].last->frame.value, 7);
+  EXPECT_FALSE(parts[0].is_main);
+  EXPECT_EQ(parts[1].num_keyframes, 2);
+  EXPECT_EQ(parts[1].first->utime_us, 500'000);
+  EXPECT_EQ(parts[1].last->utime_us, 600'000);
+  EXPECT_TRUE(parts[1].is_main);
+  EXPECT_FALSE(parts[2].first.has_value()) << "no frame";
+  EXPECT_FALSE(parts[2].is_main);
+}
+
 TEST(RunRecord, EveryFrameOfTheSourceHasARow) {
   // Frames 10 .. 17 of a source; 12 and 17 were dropped on the way, 10 is before the map, 14 is lost.
   RunRecord record;

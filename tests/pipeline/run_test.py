@@ -30,6 +30,8 @@ SUMMARY_KEYS = {
     "relocalizations",
     "keyframes",
     "landmarks",
+    "map_parts",
+    "parts",
     "loops_closed",
     "rms_error_m",
     "alignment",
@@ -76,6 +78,12 @@ def test_a_run_ends_well(reference_run: Finished) -> None:
     assert summary["frames"] == NUM_FRAMES
     assert summary["frames_dropped"] == summary["frames_lost"] == summary["tracking_failures"] == 0
     assert summary["frames_tracked"] > 0.8 * NUM_FRAMES
+    assert summary["map_parts"] == 1
+    (part,) = summary["parts"]
+    assert part["is_main"]
+    assert part["frames"] == summary["frames_tracked"]
+    assert part["keyframes"] == summary["keyframes"]
+    assert part["last_frame"] == NUM_FRAMES - 1
     assert summary["rms_error_m"] < MAX_RMS_ERROR_M
     assert summary["messages_lost"] == 0
     assert summary["keyframes"] >= 2 and summary["landmarks"] > 100

@@ -134,6 +134,7 @@ def _figures_of_all(results: list[Result]) -> list[tuple[str, list[str]]]:
         ("latency, median", of_times("latency_ms", "median")),
         ("latency, 95 %", of_times("latency_ms", "p95")),
         ("wait for the map, 95 %", of_times("map_wait_ms", "p95")),
+        ("parts of the map", from_summary("map_parts")),
         ("keyframes in the map", from_summary("keyframes")),
         ("landmarks", from_summary("landmarks")),
         ("messages repaired", from_summary("messages_repaired")),

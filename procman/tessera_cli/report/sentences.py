@@ -96,7 +96,7 @@ def remarks(result: Result) -> list[str]:
         found.append(f"The run failed: {ended}")
     if dropped := summary.get("frames_dropped"):
         found.append(f"{count(dropped, 'frame')} never reached the tracker: they came too fast to be processed.")
-    found += _lost(result)
+    found += _lost(result) + _parts(summary)
     if (wait := summary.get("map_wait_ms")) and wait["p95"] >= NOTABLE_WAIT_MS:
         found.append(
             f"The tracker waited for the mapper {wait['mean']:.1f} ms a frame on average, and {wait['p95']:.0f} ms or "
@@ -119,6 +119,19 @@ def _lost(result: Result) -> list[str]:
     ranges = [f"{run[0][1]} to {run[-1][1]}" if len(run) > 1 else str(run[0][1]) for run in runs]
     more = f" and {count(len(ranges) - MAX_RANGES, 'more range')}" if len(ranges) > MAX_RANGES else ""
     return [f"{count(len(numbers), 'frame')} got no pose: {', '.join(ranges[:MAX_RANGES])}{more}."]
+
+
+def _parts(summary: Summary) -> list[str]:
+    parts = summary.get("parts") or []
+    if len(parts) < 2:
+        return []
+    main = next(part for part in parts if part["is_main"])
+    others = count(sum(part["frames"] for part in parts if not part["is_main"]), "other frame")
+    largest = f"the largest has {count(main['keyframes'], 'keyframe')} and places {count(main['frames'], 'frame')}"
+    return [
+        f"The map is in {len(parts):,} parts that nothing joins: {largest}; the positions of "
+        f"{others} can't be compared with these."
+    ]
 
 
 def _messages(summary: Summary) -> list[str]:

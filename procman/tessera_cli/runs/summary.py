@@ -25,6 +25,8 @@ EVALUATOR_KEYS = (
     "relocalizations",
     "keyframes",
     "landmarks",
+    "map_parts",
+    "parts",
     "loops_closed",
     "stage_values",
     "pose_time_ms",

@@ -242,6 +242,16 @@ def test_more_runs_than_colors(tmp_path: Path, number: int) -> None:
     [
         ({"ended": "interrupted"}, "was interrupted"),
         ({"ended": "tracker died."}, "The run failed: tracker died."),
+        (
+            {
+                "map_parts": 2,
+                "parts": [
+                    {"frames": 9, "keyframes": 3, "is_main": False},
+                    {"frames": 100, "keyframes": 21, "is_main": True},
+                ],
+            },
+            "in 2 parts that nothing joins: the largest has 21 keyframes and places 100 frames; the positions of 9",
+        ),
         ({"frames_dropped": 3}, "3 frames never reached the tracker"),
         ({"messages_repaired": 1}, "1 message got lost on the network and was"),
         ({"messages_lost": 2}, "2 messages stayed lost"),
