@@ -65,27 +65,37 @@ class SeenLandmark {
   LandmarkId id_;
 };
 
-// Two cameras, a baseline apart, see the depth of a point between them up to  z^2 / (f baseline) sigma_px sqrt(2).
+// Two pairs of cameras, a baseline apart, see the depth of a point between them up to  z^2 / (f baseline) sigma_px.
 TEST(DepthSigma, IsThatOfATriangulation) {
-  const double expected = 10.0 * 10.0 / (500.0 * 1.0) * kKeypointSigmaPx * std::sqrt(2.0);
-  EXPECT_NEAR(SeenLandmark({{-0.5, 0, 0}, {0.5, 0, 0}}).DepthSigma() / expected, 1.0, 0.01);
+  const Eigen::Vector3d left(-0.5, 0, 0), right(0.5, 0, 0);
+  const double expected = 10.0 * 10.0 / (500.0 * 1.0) * kKeypointSigmaPx;
+  EXPECT_NEAR(SeenLandmark({left, right, left, right}).DepthSigma() / expected, 1.0, 0.01);
+}
+
+// Two views agree on some depth whatever they see; a third one confirms it.
+TEST(DepthSigma, OfTwoViewsIsHalfTheDistanceAtLeast) {
+  const Eigen::Vector3d left(-0.5, 0, 0), right(0.5, 0, 0);
+  const SeenLandmark of_two({left, right});
+  EXPECT_NEAR(of_two.DepthSigma(), 0.5 * (right - Eigen::Vector3d(0.0, 0.0, 10.0)).norm(), 1e-9);
+  EXPECT_LT(SeenLandmark({left, right, left}).DepthSigma(), 0.2);
+  EXPECT_LT(SeenLandmark({left, right}, 0, SensorType::kRgbd).DepthSigma(), 0.5);  // each has a depth of its own
 }
 
 TEST(DepthSigma, FallsWithTheParallax) {
-  const double narrow = SeenLandmark({{-0.2, 0, 0}, {0.2, 0, 0}}).DepthSigma();
-  const double wide = SeenLandmark({{-0.8, 0, 0}, {0.8, 0, 0}}).DepthSigma();
+  const double narrow = SeenLandmark({{-0.2, 0, 0}, {0.2, 0, 0}, {-0.2, 0, 0}, {0.2, 0, 0}}).DepthSigma();
+  const double wide = SeenLandmark({{-0.8, 0, 0}, {0.8, 0, 0}, {-0.8, 0, 0}, {0.8, 0, 0}}).DepthSigma();
   EXPECT_NEAR(narrow / wide, 4.0, 0.1);
 }
 
 TEST(DepthSigma, FallsWithTheNumberOfObservers) {
   const Eigen::Vector3d left(-0.5, 0, 0), right(0.5, 0, 0);
-  const double of_two = SeenLandmark({left, right}).DepthSigma();
-  EXPECT_NEAR(SeenLandmark({left, right, left, right}).DepthSigma(), of_two / std::sqrt(2.0), 1e-9);
-  EXPECT_NEAR(SeenLandmark({left, right, left, right, left, right, left, right}).DepthSigma(), of_two / 2.0, 1e-9);
+  const double of_four = SeenLandmark({left, right, left, right}).DepthSigma();
+  EXPECT_NEAR(SeenLandmark({left, right, left, right, left, right, left, right}).DepthSigma(), of_four / std::sqrt(2.0),
+              1e-9);
 }
 
 TEST(DepthSigma, GrowsWithTheKeypointsNoise) {
-  const std::vector<Eigen::Vector3d> cameras{{-0.5, 0, 0}, {0.5, 0, 0}};
+  const std::vector<Eigen::Vector3d> cameras{{-0.5, 0, 0}, {0.5, 0, 0}, {-0.5, 0, 0}};
   EXPECT_NEAR(SeenLandmark(cameras, 2).DepthSigma(), 1.44 * SeenLandmark(cameras, 0).DepthSigma(), 1e-9);
 }
 
