@@ -31,7 +31,7 @@ struct PoseEstimate {
   int32_t num_landmarks = 0;      // landmarks in the map
   bool is_keyframe = false;
   bool is_relocalized = false;  // the first pose after a loss, in a part of the map that was there before
-  // The images contradict the motion of a moment ago: the scale may have slipped. The pose follows the motion.
+  // The images contradict the motion of a moment ago: the scale may have slipped, or the camera was carried away.
   bool is_step_doubtful = false;
   FrameId relocalized_by;   // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
   int64_t num_deltas = 0;   // deltas that the map had seen by then: its step

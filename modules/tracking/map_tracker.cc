@@ -203,7 +203,8 @@ MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const 
   const Rigid3 reference_from_camera = (world_from_reference.Inverse() * frame.world_from_camera).Pose();
   const StepEvidence evidence = Judge(*motion, last_->reference_from_camera.Inverse() * reference_from_camera,
                                       TranslationCovariance(by_images.information) / area);
-  if (evidence == StepEvidence::kStrong) return {by_images, evidence};
+  // A contradiction is told, not overruled: the camera may have been carried away.
+  if (evidence != StepEvidence::kWeak) return {by_images, evidence};
 
   matched.world_from_camera =
       (world_from_reference * (last_->reference_from_camera * motion->last_from_current)).Pose();
