@@ -180,7 +180,9 @@ bool MapTracker::Localize(const Frame& view) {
   const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalize(frame);
   if (!is_near) return false;
   MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
-  const int min_inliers = lost_since_us_ ? options_.min_relocalized_inliers : options_.min_inliers;
+  const int min_of_last = static_cast<int>(options_.min_share_of_last * last_->frame.NumPoints());
+  const int min_inliers =
+      lost_since_us_ ? options_.min_relocalized_inliers : std::max(options_.min_inliers, min_of_last);
   const FramePose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < min_inliers) return false;
   Remember(std::move(frame), pose);

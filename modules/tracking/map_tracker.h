@@ -30,14 +30,15 @@ struct MapTrackerOptions {
   MatchOptions matching;
   KeyframeDecisionOptions keyframes;
   PoseOptimizationOptions pose;
-  int min_start_points = 150;         // stereo, RGB-D: keypoints with depth that a first keyframe needs
-  int min_last_matches = 20;          // fewer from the last frame: look in wider windows
-  int min_inliers = 25;               // points that a pose must agree with
-  int min_relocalized_inliers = 50;   // likewise after a loss, where chance has more room
-  int max_local_keyframes = 30;       // whose landmarks are looked for
-  int64_t max_lost_us = 1500000;      // after so long without a pose, a new part of the map begins
-  bool makes_keyframes = true;        // false: the map is used as it is, and no part is begun
-  int max_unanswered_keyframes = 8;   // live: a mapper that is far behind isn't helped by more of them
+  int min_start_points = 150;        // stereo, RGB-D: keypoints with depth that a first keyframe needs
+  int min_last_matches = 20;         // fewer from the last frame: look in wider windows
+  int min_inliers = 25;              // points that a pose must agree with
+  double min_share_of_last = 0.1;    // of the last frame's points: fewer from one frame to the next are there by chance
+  int min_relocalized_inliers = 50;  // likewise after a loss, where chance has more room
+  int max_local_keyframes = 30;      // whose landmarks are looked for
+  int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
+  bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
+  int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
   double max_depth_baselines = 40.0;  // stereo, RGB-D: up to here a keypoint's depth makes a point at once
 
   Result<> Check() const;
