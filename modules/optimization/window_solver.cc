@@ -196,6 +196,7 @@ void WindowSolver::Reduce(double radius) {
   reduced_.assign(static_cast<size_t>(num_poses * (num_poses + 1) / 2), Matrix6d::Zero());
   reduced_gradient_ = g_pose_;
   v_inverse_.resize(v_.size());
+  point_damping_.resize(v_.size());
   for (int i = 0; i < num_poses; ++i) {
     Matrix6d& block = ReducedBlock(i, i);
     block = u_[static_cast<size_t>(i)];
@@ -205,9 +206,8 @@ void WindowSolver::Reduce(double radius) {
   for (size_t point = 0; point < v_.size(); ++point) {
     const size_t begin = terms_of_point_[point], end = terms_of_point_[point + 1];
     if (begin == end) continue;
-    Eigen::Matrix3d damped = v_[point];
-    damped += PointDamping(point, radius);
-    v_inverse_[point] = damped.inverse();
+    point_damping_[point] = PointDamping(point, radius);
+    v_inverse_[point] = (v_[point] + point_damping_[point]).inverse();
     for (size_t k = begin; k < end; ++k) {
       const int row = terms_[k].free_pose;
       if (row < 0) continue;
@@ -251,7 +251,7 @@ std::optional<WindowSolver::Step> WindowSolver::SolveStep(double radius) {
   for (size_t i = 0; i < v_.size(); ++i) {
     if (terms_of_point_[i] == terms_of_point_[i + 1]) continue;
     step.points[i] = BackSubstitute(i, step.poses);
-    step.model_decrease += 0.5 * step.points[i].dot(PointDamping(i, radius) * step.points[i] - g_point_[i]);
+    step.model_decrease += 0.5 * step.points[i].dot(point_damping_[i] * step.points[i] - g_point_[i]);
   }
   return step;
 }

@@ -92,7 +92,8 @@ class WindowSolver {
 
   // The reduced problem.
   std::vector<Eigen::Matrix3d> v_inverse_;
-  std::vector<Matrix6d> reduced_;  // lower triangle, row by row
+  std::vector<Eigen::Matrix3d> point_damping_;  // D_p, by point
+  std::vector<Matrix6d> reduced_;               // lower triangle, row by row
   std::vector<Vector6d> reduced_gradient_;
 };
 

@@ -190,16 +190,23 @@ bool MapTracker::Localize(const Frame& view) {
 }
 
 std::optional<MotionPrediction> MapTracker::PredictMotion(const FrameView& view) const {
-  const int64_t interval_us = view.features().utime_us - last_->frame.view->features().utime_us;
-  return interval_us > 0 ? motion_.Predict(1e-6 * static_cast<double>(interval_us)) : std::nullopt;
+  const double interval_s = SinceLast(view);
+  return interval_s > 0.0 ? motion_.Predict(interval_s) : std::nullopt;
+}
+
+double MapTracker::SinceLast(const FrameView& view) const {
+  return 1e-6 * static_cast<double>(view.features().utime_us - last_->frame.view->features().utime_us);
 }
 
 // By the images alone where they fix how far the camera went, else carried by how it moved a moment ago.
 MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
-  TrackedFrame matched = frame;
-  const PoseOptimizationResult by_images = OptimizeFramePose(options_.pose, nullptr, frame);
   const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
-  if (!motion) return {by_images, StepEvidence::kStrong};
+  const auto optimize = [&](const PosePrior* prior, TrackedFrame& by) {
+    return OptimizeFramePose(options_.pose, prior, by);
+  };
+  if (!motion || !motion->is_steady) return {optimize(nullptr, frame), StepEvidence::kStrong};
+  TrackedFrame matched = frame;  // with the points that the images alone call outliers
+  const PoseOptimizationResult by_images = optimize(nullptr, frame);
   const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
   const double area = world_from_reference.scale * world_from_reference.scale;
   const Rigid3 reference_from_camera = (world_from_reference.Inverse() * frame.world_from_camera).Pose();
@@ -211,7 +218,7 @@ MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const 
   matched.world_from_camera =
       (world_from_reference * (last_->reference_from_camera * motion->last_from_current)).Pose();
   const PosePrior prior{matched.world_from_camera.Inverse(), (motion->covariance * area).inverse()};
-  const PoseOptimizationResult carried = OptimizeFramePose(options_.pose, &prior, matched);
+  const PoseOptimizationResult carried = optimize(&prior, matched);
   frame = std::move(matched);
   return {carried, evidence};
 }
@@ -282,14 +289,14 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
 void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
   const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
-  const int64_t interval_us = frame.view->features().utime_us - last_->frame.view->features().utime_us;
-  if (lost_since_us_ || interval_us <= 0) {
+  const double interval_s = SinceLast(*frame.view);
+  if (lost_since_us_ || interval_s <= 0.0) {
     motion_.Reset();
   } else {
     const double scale = reference_from_world.scale;
     motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera,
-                TranslationCovariance(pose.optimized.information) * scale * scale,
-                1e-6 * static_cast<double>(interval_us), pose.evidence != StepEvidence::kStrong);
+                TranslationCovariance(pose.optimized.information) * scale * scale, interval_s,
+                pose.evidence != StepEvidence::kStrong);
   }
   lost_since_us_.reset();
   last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence});

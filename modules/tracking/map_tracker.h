@@ -100,6 +100,7 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
   bool Localize(const Frame& view);
+  double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
   bool FollowLast(TrackedFrame& frame) const;
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
