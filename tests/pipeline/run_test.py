@@ -247,8 +247,8 @@ def test_a_live_run_is_replayed_as_it_went(tessera: Tessera, sequence: Path) -> 
 def test_an_interrupted_run_writes_what_it_has(tessera: Tessera, sequence: Path, number: signal.Signals) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.5", "--port", port, "--out", folder)
-    wait_for(lambda: pids_of(folder, "camera"), "the camera")
-    time.sleep(2.0)  # what is tried is an end somewhere in the middle
+    while " tracked, " not in (line := read_line(run)):
+        assert line, "the run ended by itself"
     run.send_signal(number)
     out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
     assert run.returncode == 1, out
