@@ -75,6 +75,7 @@ class PoseProblem {
   }
   LinearTerm Linearize(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& point_in_camera, size_t i) const;
   void MoveDepth(size_t i, double step);
+  double Bound(const Matrix6d& information) const;
 
   const PosePrior* prior_;  // nullptr: none
   const CameraCalibration& calibration_;
@@ -83,6 +84,9 @@ class PoseProblem {
   std::vector<char> is_inlier_;
   std::vector<Depth> depths_;
   std::vector<Eliminated> eliminated_;
+  // Of the last step, its observations alone: the inverse of their information about the translation; zero before it.
+  Eigen::Matrix3d known_translation_ = Eigen::Matrix3d::Zero();
+  double max_leverage_ = 1.0;
   double rms_ = 0.0;
 };
 
@@ -103,6 +107,13 @@ void PoseProblem::MoveDepth(size_t i, double step) {
   if (depth.relative_sigma > 0.0) depth.u = std::max(depth.u + step, (kMinInverseRatio - 1.0) / depth.relative_sigma);
 }
 
+// The weight by which an observation of this information has no more than the greatest leverage: its share of what the
+// last step knew of the translation, a mean over the axes.
+double PoseProblem::Bound(const Matrix6d& information) const {
+  const double leverage = known_translation_.cwiseProduct(information.topLeftCorner<3, 3>()).sum() / 3.0;
+  return leverage > max_leverage_ ? max_leverage_ / leverage : 1.0;
+}
+
 std::optional<Vector6d> PoseProblem::Step(const Rigid3& camera_from_world, Matrix6d* information) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
   NormalEquations equations;
@@ -113,14 +124,20 @@ std::optional<Vector6d> PoseProblem::Step(const Rigid3& camera_from_world, Matri
     const LinearTerm term = Linearize(rotation, point, i);
     const Eigen::Vector3d& residual = term.reprojection.residual;
     const double u = depths_[i].u;
-    const double weight = HuberWeight(residual.squaredNorm() + u * u, Chi2Limit(observations_[i].seen.has_right()));
+    const double huber = HuberWeight(residual.squaredNorm() + u * u, Chi2Limit(observations_[i].seen.has_right()));
     const Vector6d coupling = term.by_pose.transpose() * term.by_depth;
     const double curvature = 1.0 + term.by_depth.squaredNorm(), gradient = term.by_depth.dot(residual) + u;
-    equations.information.noalias() += weight * (term.by_pose.transpose() * term.by_pose);
-    equations.information.noalias() -= (weight / curvature) * (coupling * coupling.transpose());
-    equations.gradient.noalias() += weight * (term.by_pose.transpose() * residual - (gradient / curvature) * coupling);
+    Matrix6d own = huber * (term.by_pose.transpose() * term.by_pose);
+    own.noalias() -= (huber / curvature) * (coupling * coupling.transpose());
+    const double bound = Bound(own);
+    equations.information += bound * own;
+    equations.gradient.noalias() +=
+        (bound * huber) * (term.by_pose.transpose() * residual - (gradient / curvature) * coupling);
     eliminated_.push_back({i, coupling, curvature, gradient});
   }
+  known_translation_ = equations.information.topLeftCorner<3, 3>().inverse();
+  max_leverage_ = std::max(kMaxLeverage, 3.0 / static_cast<double>(eliminated_.size()));
+  if (!known_translation_.allFinite()) return std::nullopt;
   if (prior_ != nullptr) {
     const Eigen::Vector3d center = (camera_from_world * prior_->camera_from_world.Inverse()).translation;
     equations.information.topLeftCorner<3, 3>() += prior_->information;

@@ -26,6 +26,9 @@ struct PosePrior {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // of the center, in the camera's axes; 1 / m^2
 };
 
+// Of the information about the translation, but at least three times an observation's mean share.
+inline constexpr double kMaxLeverage = 0.02;
+
 struct PoseOptimizationOptions {
   int num_rounds = 4;      // after each, observations are sorted anew into inliers and outliers
   int max_iterations = 5;  // Gauss-Newton steps a round; they converge in 2 to 4 from a fair start
@@ -53,7 +56,11 @@ Eigen::Matrix3d TranslationCovariance(const Eigen::Matrix<double, 6, 6>& informa
 // u counts standard deviations of the inverse depth. Each u is eliminated from the normal equations (Schur), so a far
 // point whose depth hardly anything is known of holds the rotation and weighs little in the translation. Points must
 // not be taken as exact where they aren't: errors in them make the motion come out too small (regression dilution, W.
-// Fuller, "Measurement Error Models", 1987), and what is triangulated from that motion is nearer again. Observations
+// Fuller, "Measurement Error Models", 1987), and what is triangulated from that motion is nearer again.
+//
+// A false match whose point stands near, among far ones, would fix the translation all by itself: no Huber loss is safe
+// from leverage. So no observation has more than kMaxLeverage of what all of them know of the translation (bounded
+// influence, W. Krasker and R. Welsch, "Efficient Bounded-Influence Regression Estimation", JASA 1982). Observations
 // that stand behind the camera, or that fail the chi-square test after a round, take no part in the next; they may
 // return. `baseline_m` as in Reprojection. With fewer than 3 inliers the pose is returned as it was and num_inliers is
 // 0.

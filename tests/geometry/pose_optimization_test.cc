@@ -37,7 +37,7 @@ INSTANTIATE_TEST_SUITE_P(MonoAndStereo, OptimizePoseTest, testing::Bool());
 TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
   const Rigid3 truth{ExpSO3({0.02, -0.1, 0.03}), {0.4, -0.2, 0.6}};
   std::vector<PoseObservation> observations;
-  for (const Eigen::Vector3d& point : MakePoints(Scene::kGeneral, truth, 100)) {
+  for (const Eigen::Vector3d& point : MakePoints(Scene::kGeneral, truth, 1000)) {
     observations.push_back({.point_in_world = point, .seen = SeePoint(truth * point, true)});
   }
   const auto cost = [&](const Eigen::Matrix<double, 6, 1>& delta) {
@@ -53,6 +53,24 @@ TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
     const Eigen::Matrix<double, 6, 1> step = 1e-4 * Eigen::Matrix<double, 6, 1>::Unit(axis);
     const double curvature = (cost(step) + cost(-step) - 2.0 * cost(step - step)) / 1e-8;
     EXPECT_NEAR(curvature / result.information(axis, axis), 1.0, 1e-3) << axis;
+  }
+}
+
+// What leverage does: the true points are far, and a few false matches claim to be near. All of them agree exactly with
+// a camera that moved half as far as it did.
+TEST(OptimizePose, AFewNearPointsDontOverruleTheOthers) {
+  const Rigid3 truth{Eigen::Quaterniond::Identity(), {0.0, 0.0, -2.0}};
+  const Rigid3 false_pose{Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0}};
+  std::vector<PoseObservation> observations;
+  const auto add = [&](const Eigen::Vector3d& point, const Rigid3& pose) {
+    observations.push_back({.point_in_world = point, .seen = SeePoint(pose * point, false)});
+  };
+  for (int i = 0; i < 120; ++i) add({i % 2 == 0 ? 30.0 : -30.0, -10.0 + 0.25 * (i % 60), 80.0 + 0.5 * i}, truth);
+  for (int i = 0; i < 4; ++i) add({i % 2 == 0 ? 2.0 : -2.0, 0.5 * i - 1.0, 8.0}, false_pose);
+  for (const Rigid3& start : {truth, Rigid3::Identity()}) {
+    const PoseOptimizationResult result = OptimizePose(MakeCamera(), 0.0, observations, start, {});
+    EXPECT_THAT(result.camera_from_world, IsNear(truth, 0.05));
+    EXPECT_EQ(result.num_inliers, 120);
   }
 }
 
