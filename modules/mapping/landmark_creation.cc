@@ -12,6 +12,7 @@
 namespace tessera {
 namespace {
 
+constexpr double kMinLever = 1e-8;          // squared sine of the angle between a ray and the way from view to view
 constexpr double kMinLandmarkDepth = 1e-3;  // of a new one, in units of the map: nearer ones are false matches
 
 LandmarkId AddLandmark(const Eigen::Vector3d& position_in_world, std::initializer_list<Observation> observations,
@@ -32,8 +33,7 @@ double AngleOf(const Rigid3& second_from_first) {
 // The search for second views of one keyframe's keypoints in another.
 class PairSearch {
  public:
-  PairSearch(const Map& map, KeyframeId first, KeyframeId second, double min_depth, double min_parallax_per_turn,
-             const CreationOptions& options)
+  PairSearch(const Map& map, KeyframeId first, KeyframeId second, double min_depth, const CreationOptions& options)
       : options_(options),
         first_(*map.FindKeyframe(first)),
         second_(*map.FindKeyframe(second)),
@@ -43,7 +43,7 @@ class PairSearch {
         rotation_(second_from_first_.rotation.toRotationMatrix()),
         roll_(RollBetween(second_from_first_)),
         max_inverse_depth_(1.0 / min_depth),
-        min_parallax_of_turn_(min_parallax_per_turn * AngleOf(second_from_first_)) {
+        min_parallax_of_turn_(options.min_parallax_per_turn * AngleOf(second_from_first_)) {
     for (int level = 0; level < kMaxLevels; ++level) {
       limits_px_[static_cast<size_t>(level)] = std::sqrt(kChi2LimitOfOne) * LevelScale(level);
     }
@@ -72,6 +72,8 @@ class PairSearch {
   InverseDepths Bounds(const PixelObservation& seen) const;
   std::optional<int32_t> BestOnLine(int32_t keypoint, const PixelObservation& seen, const Eigen::Vector3d& ray) const;
   std::optional<Eigen::Vector3d> Triangulate(const PixelObservation& in_first, const PixelObservation& in_second) const;
+  std::optional<Eigen::Vector3d> FarPoint(const Eigen::Vector3d& ray, const Eigen::Vector3d& ray_in_second,
+                                          double noise_rad) const;
   bool IsConsistent(const Eigen::Vector3d& point_in_first, const PixelObservation& in_first,
                     const PixelObservation& in_second) const;
 
@@ -156,7 +158,7 @@ std::optional<int32_t> PairSearch::BestOnLine(int32_t keypoint, const PixelObser
   return best;
 }
 
-// From the two rays where they have parallax enough, else from the disparity of one of them.
+// From the two rays where they have parallax, from the disparity of one of them where that has more.
 std::optional<Eigen::Vector3d> PairSearch::Triangulate(const PixelObservation& in_first,
                                                        const PixelObservation& in_second) const {
   const Eigen::Vector3d ray = calibration_.Ray(in_first.pixel_px);
@@ -172,10 +174,30 @@ std::optional<Eigen::Vector3d> PairSearch::Triangulate(const PixelObservation& i
   if (parallax >= std::max({min_parallax, min_parallax_of_turn_, by_first, by_second})) {
     return TriangulateRays(second_from_first_, ray, ray_in_second);
   }
+  if (!in_first.has_right() && !in_second.has_right()) {
+    return FarPoint(ray, ray_in_second, std::hypot(noise_rad, min_parallax_of_turn_ / options_.min_parallax_sigmas));
+  }
   if (std::max(by_first, by_second) < min_parallax) return std::nullopt;
   if (by_first >= by_second) return PointFromDisparity(calibration_, baseline_m_, in_first);
   const auto point = PointFromDisparity(calibration_, baseline_m_, in_second);
   return point ? std::optional<Eigen::Vector3d>(second_from_first_.Inverse() * *point) : std::nullopt;
+}
+
+// Two rays that are parallel up to noise, or diverge. The point at inverse depth w along the first one stands, up to
+// scale, at a + w t in the second camera, a = R ray. With the second ray b of length 1 it is nearest to that for
+//
+//   w = -(b x a) . (b x t) / |b x t|^2,    sigma_w = noise |ray| / |b x t|
+//
+// and w may come out negative. What is left of its distribution above zero has its mean at about
+// (w + sqrt(w^2 + 2 sigma_w^2)) / 2.
+std::optional<Eigen::Vector3d> PairSearch::FarPoint(const Eigen::Vector3d& ray, const Eigen::Vector3d& ray_in_second,
+                                                    double noise_rad) const {
+  const Eigen::Vector3d b = ray_in_second.normalized();
+  const Eigen::Vector3d aside = b.cross(rotation_ * ray), by_depth = b.cross(second_from_first_.translation);
+  const double squared = by_depth.squaredNorm();
+  if (squared < kMinLever * second_from_first_.translation.squaredNorm()) return std::nullopt;
+  const double w = -aside.dot(by_depth) / squared, sigma = noise_rad * ray.norm() / std::sqrt(squared);
+  return Eigen::Vector3d(2.0 / (w + std::sqrt(w * w + 2.0 * sigma * sigma)) * ray);
 }
 
 bool PairSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const PixelObservation& in_first,
@@ -253,19 +275,12 @@ std::vector<LandmarkId> CreateFromPairs(KeyframeId id, const CreationOptions& op
   const double camera_baseline_m = Baseline(keyframe.features->calibration);
   const double min_baseline = camera_baseline_m > 0.0 ? camera_baseline_m : options.min_baseline_share * median_depth;
 
-  const auto search_neighbors = [&](double min_parallax_per_turn) {
-    for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
-      const Keyframe& other = *map.FindKeyframe(other_id);
-      const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
-      if (baseline < min_baseline) continue;
-      const PairSearch search(map, id, other_id, min_depth, min_parallax_per_turn, options);
-      CreateFromPair(id, other_id, search, created, editor);
-    }
-  };
-  search_neighbors(options.min_parallax_per_turn);
-  const auto num_landmarks = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(),
-                                           [](LandmarkId landmark) { return landmark.valid(); });
-  if (num_landmarks < options.min_landmarks) search_neighbors(0.0);
+  for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
+    const Keyframe& other = *map.FindKeyframe(other_id);
+    const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
+    if (baseline < min_baseline) continue;
+    CreateFromPair(id, other_id, PairSearch(map, id, other_id, min_depth, options), created, editor);
+  }
   return created;
 }
 

@@ -14,6 +14,7 @@ namespace {
 // confirm it. Until then the depth is known to half of itself.
 constexpr size_t kConfirmingObservations = 3;
 constexpr double kUnconfirmedShare = 0.5;
+constexpr double kMaxKnownShare = 0.6;  // of the distance
 
 Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in_world,
                               const std::vector<Observation>& observations) {
@@ -65,7 +66,13 @@ double DepthInformation(const FeatureFrame& features, int32_t keypoint, const Ri
   return (seen.by_point * (camera_from_world * landmark.normal)).squaredNorm();
 }
 
-double DepthSigma(double information, double distance) { return std::min(distance, 1.0 / std::sqrt(information)); }
+double DepthSigma(double information, double distance) {
+  return std::min(kMaxDepthShare * distance, 1.0 / std::sqrt(information));
+}
+
+bool HasDepth(const Landmark& landmark, const Eigen::Vector3d& camera_in_world) {
+  return landmark.depth_sigma <= kMaxKnownShare * (landmark.position_in_world - camera_in_world).norm();
+}
 
 Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   Landmark landmark = *map.FindLandmark(id);

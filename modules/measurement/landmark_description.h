@@ -8,9 +8,8 @@ namespace tessera {
 // The landmark with normal, distance range and descriptor computed anew from its present observations (at least one):
 //
 //   normal = normalized mean over observations of (camera_in_world - position) / |camera_in_world - position|
-//   depth_sigma = (sum over observations of |d(pixel)/d(position) normal|^2 / sigma_px^2)^-1/2, at most d; at least d /
-//   2
-//     where two views without a depth of their own are all there is
+//   depth_sigma = (sum over observations of |d(pixel)/d(position) normal|^2 / sigma_px^2)^-1/2,   at most
+//     kMaxDepthShare d; at least d / 2 where two views without a depth of their own are all there is
 //   max_distance = d * 1.2^level,  min_distance = max_distance / 1.2^kTopLevel
 //
 // with d and level from the newest keyframe that saw it: closer than min_distance or farther than max_distance its
@@ -28,9 +27,15 @@ inline constexpr int kMaxDescriptors = 12;
 // inverse of a variance, 1 / m^2 (mono: in units of the map). 0 where the landmark stands behind the camera.
 double DepthInformation(const FeatureFrame& features, int32_t keypoint, const Rigid3& world_from_camera,
                         const Landmark& landmark);
-// The standard deviation that all information together leaves; never more than the distance itself, which is what
-// nothing but a direction is known by.
+// The standard deviation that all information together leaves, never more than kMaxDepthShare of the distance. More
+// than the distance itself: of the inverse depth no more is known than that it is between zero and a multiple of its
+// value.
+inline constexpr double kMaxDepthShare = 100.0;
 double DepthSigma(double information, double distance);
+
+// Whether more is known of its distance from this camera than that it may be any: of far points whose parallax drowns
+// in noise it isn't.
+bool HasDepth(const Landmark& landmark, const Eigen::Vector3d& camera_in_world);
 
 // The landmark of a keyframe's frame and units in the world's.
 Landmark InWorld(const Sim3& world_from_keyframe, Landmark point_in_keyframe);

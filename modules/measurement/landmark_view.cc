@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "measurement/landmark_description.h"
+
 namespace tessera {
 
 std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe) {
@@ -11,8 +13,9 @@ std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe) {
   std::vector<double> depths;
   for (const LandmarkId id : keyframe.landmarks) {
     if (!id.valid()) continue;
-    const double z = (camera_from_world * map.FindLandmark(id)->position_in_world).z();
-    if (z > 0.0) depths.push_back(z);
+    const Landmark& landmark = *map.FindLandmark(id);
+    const double z = (camera_from_world * landmark.position_in_world).z();
+    if (z > 0.0 && HasDepth(landmark, keyframe.world_from_camera.translation)) depths.push_back(z);
   }
   std::sort(depths.begin(), depths.end());
   return depths;

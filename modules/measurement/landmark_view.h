@@ -12,7 +12,7 @@
 
 namespace tessera {
 
-// Depths (z) of the landmarks in front of a keyframe that it sees, rising.
+// Depths (z) of the landmarks in front of a keyframe that it sees and whose depth is known, rising.
 std::vector<double> LandmarkDepths(const Map& map, const Keyframe& keyframe);
 // Their median; 1 if there are none.
 double MedianDepth(const Map& map, const Keyframe& keyframe);

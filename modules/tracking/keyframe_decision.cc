@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/triangulation.h"
+#include "measurement/landmark_description.h"
 
 namespace tessera {
 namespace {
@@ -12,6 +13,11 @@ double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+// Far points stay in view for long, and tell nothing about how much of what is near has gone.
+bool IsKnown(const SeenPoint& point, const TrackedFrame& frame) {
+  return point.valid() && HasDepth(point.landmark, frame.world_from_camera.translation);
 }
 
 }  // namespace
@@ -29,7 +35,7 @@ void KeyframeDecision::Restart(const TrackedFrame& frame) {
   first_utime_us_.reset();
   points_.clear();
   for (const SeenPoint& point : frame.points) {
-    if (point.valid()) points_.push_back(point.id);
+    if (IsKnown(point, frame)) points_.push_back(point.id);
   }
   std::sort(points_.begin(), points_.end());
 }
@@ -44,7 +50,7 @@ KeyframeDecision::Seen KeyframeDecision::See(const TrackedFrame& frame, const Ri
   Seen seen;
   std::vector<double> cosines;
   for (const SeenPoint& point : frame.points) {
-    if (!point.valid() || !std::binary_search(points_.begin(), points_.end(), point.id)) continue;
+    if (!IsKnown(point, frame) || !std::binary_search(points_.begin(), points_.end(), point.id)) continue;
     seen.points.push_back(point.id);
     cosines.push_back(CosParallax(point.landmark.position_in_world, world_from_reference.translation,
                                   frame.world_from_camera.translation));

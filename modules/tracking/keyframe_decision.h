@@ -60,7 +60,8 @@ class KeyframeDecision {
   const KeyframeDecisionOptions options_;
   int64_t utime_us_ = 0;                   // of the reference
   std::optional<int64_t> first_utime_us_;  // of the frame after it, once that was asked
-  std::vector<PointId> points_;  // sorted: that the reference saw; later, those of them that the frame after it saw
+  // Sorted: points of known depth that the reference saw; later, those of them that the frame after it saw.
+  std::vector<PointId> points_;
 };
 
 }  // namespace tessera

@@ -100,12 +100,20 @@ TEST(DepthSigma, GrowsWithTheKeypointsNoise) {
 }
 
 // Of a point that was seen from one side only, nothing but the direction is known: its depth is anyone's guess.
-TEST(DepthSigma, IsTheDistanceAtMost) {
-  EXPECT_DOUBLE_EQ(SeenLandmark({{0, 0, 0}}).DepthSigma(), 10.0);
-  EXPECT_DOUBLE_EQ(SeenLandmark({{0, 0, 0}, {0, 0, 0}}).DepthSigma(), 10.0);
-  EXPECT_DOUBLE_EQ(SeenLandmark({{-1e-3, 0, 0}, {1e-3, 0, 0}}).DepthSigma(), Eigen::Vector3d(1e-3, 0, 10.0).norm());
-  EXPECT_EQ(DepthSigma(0.0, 7.0), 7.0);
+TEST(DepthSigma, WithoutParallaxIsAMultipleOfTheDistance) {
+  EXPECT_DOUBLE_EQ(SeenLandmark({{0, 0, 0}}).DepthSigma(), kMaxDepthShare * 10.0);
+  EXPECT_DOUBLE_EQ(SeenLandmark({{0, 0, 0}, {0, 0, 0}}).DepthSigma(), kMaxDepthShare * 10.0);
+  EXPECT_GT(SeenLandmark({{-1e-3, 0, 0}, {1e-3, 0, 0}}).DepthSigma(), 50.0);
+  EXPECT_EQ(DepthSigma(0.0, 7.0), kMaxDepthShare * 7.0);
   EXPECT_EQ(DepthSigma(4.0, 7.0), 0.5);
+}
+
+TEST(HasDepth, UnlessTheDistanceMayBeAny) {
+  Landmark landmark{.position_in_world = {0, 0, 10.0}, .depth_sigma = 5.0};
+  EXPECT_TRUE(HasDepth(landmark, {0, 0, 0}));
+  EXPECT_FALSE(HasDepth(landmark, {0, 0, 5.0})) << "5 m off, known to 5 m";
+  landmark.depth_sigma = 10.0;
+  EXPECT_FALSE(HasDepth(landmark, {0, 0, 0}));
 }
 
 TEST(DepthSigma, ACameraThatTheLandmarkStandsBehindSaysNothing) {
