@@ -69,6 +69,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
   Insert(seen, editor);
+  RememberMotion(seen);
   ObserveLandmarks(seen, editor);
   ObserveShared(seen, editor);
   ChooseParent(seen.id, editor);
@@ -76,7 +77,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   const std::vector<LandmarkId> from_pairs = CreateLandmarks(seen.id, editor);
   FuseLandmarks(seen.id, options_.fusion, editor);
   RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
-  AdjustLocally(seen.id, options_.window, options_.bundle, editor);
+  AdjustLocally(seen.id, options_.window, options_.bundle, motions_, editor);
   CullKeyframes(seen.id, options_.keyframe_culling, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
@@ -116,7 +117,7 @@ bool Mapper::ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now,
       continue;
     }
     CloseLoop(loop, options_.loop_fusion, editor);
-    AdjustLocally(loop.answers, options_.window, options_.bundle, editor);
+    AdjustLocally(loop.answers, options_.window, options_.bundle, motions_, editor);
     last_corrected_ = now;
     wants_adjustment_ = is_base_outdated_ = has_moved = true;
   }
@@ -154,6 +155,14 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
       world_from_reference ? *world_from_reference * seen.reference_from_camera : Sim3::From(seen.world_from_camera);
   editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe,
                      std::make_shared<const FeatureFrame>(seen.features));
+}
+
+// Priors of keyframes that have left the map since are forgotten.
+void Mapper::RememberMotion(const KeyframeObservation& seen) {
+  std::erase_if(motions_, [this](const auto& motion) {
+    return map_.FindKeyframe(motion.first) == nullptr || map_.FindKeyframe(motion.second.reference) == nullptr;
+  });
+  if (seen.expected.is_known()) motions_[seen.id] = {seen.reference, seen.expected};
 }
 
 void Mapper::ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor) {

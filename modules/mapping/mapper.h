@@ -16,6 +16,7 @@
 #include "mapping/map_correction.h"
 #include "messages/tracking_types.h"
 #include "optimization/bundle_adjustment.h"
+#include "optimization/local_adjustment.h"
 
 namespace tessera {
 
@@ -63,6 +64,7 @@ class Mapper {
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
+  void RememberMotion(const KeyframeObservation& seen);
   void ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor);
   void ObserveShared(const KeyframeObservation& seen, MapEditor& editor);
   // Returns those created from pairs of keyframes.
@@ -70,6 +72,7 @@ class Mapper {
 
   const MapperOptions options_;
   Map map_;
+  KeyframeMotions motions_;  // of keyframes in the map
   RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;
   KeyframeId last_corrected_;           // the delta that answers it corrected the map

@@ -48,6 +48,14 @@ struct SharedKeypoint {
   Eigen::Vector3d position_in_other = Eigen::Vector3d::Zero();
 };
 
+// Where a camera should be by how it moved a moment ago, whatever its images say (tracking/motion_model.h).
+struct MotionPrior {
+  Eigen::Vector3d position_in_reference = Eigen::Vector3d::Zero();  // frame and units of the reference keyframe
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();            // of it, 1 / units^2; zero: nothing is expected
+
+  bool is_known() const { return !information.isZero(0.0); }
+};
+
 // A frame that becomes part of the map. Its features never change; its pose does, later, in the mapper.
 struct KeyframeObservation {
   KeyframeId id;
@@ -56,6 +64,7 @@ struct KeyframeObservation {
   std::vector<LandmarkId> landmarks;   // by keypoint: the landmark it saw; invalid: none
   KeyframeId reference;                // the keyframe that the estimate is relative to; invalid: a new part begins
   Rigid3 reference_from_camera;        // as in PoseEstimate
+  MotionPrior expected;                // by how the camera moved when `reference` was made
   std::vector<SharedKeypoint> shared;  // points without an id yet: mono's first ones, or from depth
   int64_t num_deltas = 0;              // as in PoseEstimate
 };

@@ -136,9 +136,8 @@ Result<> CheckGauge(const BundleProblem& problem) {
       problem.poses[static_cast<size_t>(problem.scale_pose)].is_fixed) {
     return Failed("scale_pose must be the index of a free pose, or -1");
   }
-  if (num_fixed > 1 || problem.has_right() || !problem.constraints.empty()) {
-    return Failed(
-        "scale_pose is for mono with one fixed pose and no constraints; all else fixes the scale, so set it to -1");
+  if (num_fixed > 1 || problem.has_right()) {
+    return Failed("scale_pose is for mono with one fixed pose; all else fixes the scale, so set it to -1");
   }
   return {};
 }

@@ -47,7 +47,7 @@ struct BundleProblem {
   std::vector<BundleObservation> observations;
   std::vector<RelativePoseConstraint> constraints;
   // Mono with one fixed pose leaves the scale free. Index of a pose whose distance to the fixed one is kept; -1: none,
-  // since a second fixed pose, a right column or a constraint fixes the scale.
+  // since a second fixed pose, a right column or the constraints of a double window fix the scale.
   int scale_pose = -1;
 
   int num_fixed_poses() const;

@@ -9,6 +9,10 @@
 namespace tessera {
 namespace {
 
+constexpr size_t kConfirmingObservers = 4;
+constexpr size_t kMinConfirmed = 50;  // landmarks of a window
+constexpr double kNoInformation = 1e-6;
+
 void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleProblem& problem) {
   const auto add = [&](KeyframeId id, bool is_fixed) {
     problem.poses.push_back({id, map.FindKeyframe(id)->world_from_camera.Inverse(), is_fixed});
@@ -82,6 +86,32 @@ void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
   }
 }
 
+// Nothing is expected of the rotation.
+void AddMotions(const Map& map, const KeyframeMotions& motions, BundleProblem& problem) {
+  const auto index_of = [&](KeyframeId id) {
+    const auto found =
+        std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& pose) { return pose.id == id; });
+    return static_cast<int>(found - problem.poses.begin());
+  };
+  const auto num_poses = static_cast<int>(problem.poses.size());
+  for (int to = 0; to < num_poses; ++to) {
+    const auto motion = motions.find(problem.poses[Index(to)].id);
+    const int from = motion != motions.end() ? index_of(motion->second.reference) : num_poses;
+    if (from == num_poses || (problem.poses[Index(from)].is_fixed && problem.poses[Index(to)].is_fixed)) continue;
+    const double scale = map.FindKeyframe(motion->second.reference)->scale;
+    const Rigid3 to_from_from =
+        problem.poses[Index(to)].camera_from_world * problem.poses[Index(from)].camera_from_world.Inverse();
+    const Eigen::Matrix3d rotation = to_from_from.rotation.toRotationMatrix();
+    const MotionPrior& expected = motion->second.expected;
+    RelativePoseConstraint constraint{from, to, {to_from_from.rotation, {}}};
+    constraint.to_from_from.translation = -scale * (rotation * expected.position_in_reference);
+    constraint.information *= kNoInformation;
+    constraint.information.topLeftCorner<3, 3>() =
+        rotation * expected.information * rotation.transpose() / (scale * scale);
+    problem.constraints.push_back(constraint);
+  }
+}
+
 // Mono with a single fixed pose: the free pose of the lowest id keeps its distance.
 int ScalePose(const BundleProblem& problem) {
   if (problem.num_fixed_poses() > 1 || problem.has_right()) return -1;
@@ -93,6 +123,35 @@ int ScalePose(const BundleProblem& problem) {
     }
   }
   return best;
+}
+
+bool IsConfirmed(const Map& map, LandmarkId id) {
+  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  return observations.size() >= kConfirmingObservers ||
+         std::any_of(observations.begin(), observations.end(), [&](const Observation& seen) {
+           return SeenAt(*map.FindKeyframe(seen.keyframe)->features, seen.keypoint).has_right();
+         });
+}
+
+// Takes the landmarks out that are not confirmed, unless too few would be left.
+std::vector<LandmarkId> TakeUnconfirmed(const Map& map, std::vector<LandmarkId>& landmarks) {
+  std::vector<LandmarkId> confirmed, unconfirmed;
+  for (const LandmarkId id : landmarks) (IsConfirmed(map, id) ? confirmed : unconfirmed).push_back(id);
+  if (confirmed.size() < kMinConfirmed) return {};
+  landmarks = std::move(confirmed);
+  return unconfirmed;
+}
+
+// The landmarks by themselves: all poses of the window are fixed where they are now.
+BundleProblem BuildPointProblem(const Map& map, const BundleProblem& window, const std::vector<LandmarkId>& landmarks) {
+  BundleProblem problem;
+  problem.calibration = window.calibration;
+  problem.baseline_m = window.baseline_m;
+  for (const BundlePose& pose : window.poses) {
+    problem.poses.push_back({pose.id, map.FindKeyframe(pose.id)->world_from_camera.Inverse(), true});
+  }
+  AddLandmarks(map, landmarks, problem.poses.size(), problem);
+  return problem;
 }
 
 // Landmarks that only keyframe `id` observes move with it.
@@ -110,7 +169,8 @@ void MoveOwnLandmarks(KeyframeId id, const Rigid3& world_from_camera, MapEditor&
 
 }  // namespace
 
-BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const LocalWindowOptions& options) {
+BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const LocalWindowOptions& options,
+                                const KeyframeMotions& motions) {
   BundleProblem problem;
   problem.calibration = map.FindKeyframe(window.inner.front())->features->calibration;
   problem.baseline_m = Baseline(problem.calibration);
@@ -118,6 +178,7 @@ BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const
   AddLandmarks(map, window.landmarks, options.is_double ? window.inner.size() : problem.poses.size(), problem);
   if (options.is_double) AddConstraints(map, window.inner.size(), problem);
   problem.scale_pose = problem.constraints.empty() ? ScalePose(problem) : -1;
+  AddMotions(map, motions, problem);
   return problem;
 }
 
@@ -149,13 +210,19 @@ void WriteBack(const BundleProblem& problem, const BundleResult& result, MapEdit
 }
 
 void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, const BundleOptions& bundle_options,
-                   MapEditor& editor) {
-  const LocalWindow window = SelectLocalWindow(editor.map(), center, window_options);
+                   const KeyframeMotions& motions, MapEditor& editor) {
+  const Map& map = editor.map();
+  LocalWindow window = SelectLocalWindow(map, center, window_options);
+  const std::vector<LandmarkId> unconfirmed = TakeUnconfirmed(map, window.landmarks);
   if (window.landmarks.empty()) return;
-  const BundleProblem problem = BuildLocalProblem(editor.map(), window, window_options);
+  const BundleProblem problem = BuildLocalProblem(map, window, window_options, motions);
   if (const std::optional<BundleResult> result = AdjustBundle(problem, bundle_options)) {
     WriteBack(problem, *result, editor);
   }
+  const BundleProblem points = BuildPointProblem(map, problem, unconfirmed);
+  if (points.points.empty()) return;
+  if (const std::optional<BundleResult> result = AdjustBundle(points, bundle_options))
+    WriteBack(points, *result, editor);
 }
 
 }  // namespace tessera

@@ -1,11 +1,20 @@
 // Bundle adjustment of the keyframes and landmarks around a keyframe, inside the map.
 #pragma once
 
+#include <map>
+
 #include "map/local_window.h"
 #include "map/map_editor.h"
+#include "messages/tracking_types.h"
 #include "optimization/bundle_adjustment.h"
 
 namespace tessera {
+
+struct KeyframeMotion {
+  KeyframeId reference;
+  MotionPrior expected;
+};
+using KeyframeMotions = std::map<KeyframeId, KeyframeMotion>;
 
 // The optimization problem of a window: inner poses free, outer ones fixed; a root of the spanning tree is fixed too.
 // If nothing else fixes a pose, the oldest inner one is; mono then keeps the distance of the next one (scale).
@@ -15,7 +24,11 @@ namespace tessera {
 // landmarks at their depth z would:
 //
 //   information = n (f / sigma_px)^2 diag(1 / z^2, 1)                 of (translation, rotation)
-BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const LocalWindowOptions& options);
+//
+// `motions`: where the camera of a keyframe should be by how it moved before, relative to another keyframe. Such priors
+// take part where both are in the window; they are too weak to move what images fix.
+BundleProblem BuildLocalProblem(const Map& map, const LocalWindow& window, const LocalWindowOptions& options,
+                                const KeyframeMotions& motions = {});
 inline constexpr int kMaxConstraints = 6;  // of an outer pose
 
 // Writes poses and positions back, and removes the observations that the optimization found to be outliers, and
@@ -23,8 +36,10 @@ inline constexpr int kMaxConstraints = 6;  // of an outer pose
 void WriteBack(const BundleProblem& problem, const BundleResult& result, MapEditor& editor);
 
 // Selects the window around `center`, optimizes it and writes the result back. Does nothing where there is nothing to
-// optimize.
+// optimize. Two rays meet somewhere whatever they show, also where keypoints only look alike: landmarks that fewer than
+// kConfirmingObservers keyframes see, and none with depth, follow the poses and don't move them, unless there are too
+// few others.
 void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, const BundleOptions& bundle_options,
-                   MapEditor& editor);
+                   const KeyframeMotions& motions, MapEditor& editor);
 
 }  // namespace tessera

@@ -13,6 +13,9 @@
 namespace tessera {
 namespace {
 
+// Of the points that agree on a pose by themselves: fewer that agree with the motion of a moment ago contradict it.
+constexpr double kMinShareWithMotion = 0.5;
+
 // A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark. `covariance`: of the
 // point, if its depth isn't known by the view itself.
 Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera,
@@ -116,7 +119,7 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
 }
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
-  motion_.Reset();
+  ResetMotion();
   return view->baseline_m() > 0.0 ? StartFromDepth(view, keyframes) : StartFromPair(view, keyframes);
 }
 
@@ -198,29 +201,43 @@ double MapTracker::SinceLast(const FrameView& view) const {
   return 1e-6 * static_cast<double>(view.features().utime_us - last_->frame.view->features().utime_us);
 }
 
-// By the images alone where they fix how far the camera went, else carried by how it moved a moment ago.
-MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
-  const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
-  const auto optimize = [&](const PosePrior* prior, TrackedFrame& by) {
-    return OptimizeFramePose(options_.pose, prior, by);
-  };
-  if (!motion || !motion->is_steady) return {optimize(nullptr, frame), StepEvidence::kStrong};
-  TrackedFrame matched = frame;  // with the points that the images alone call outliers
-  const PoseOptimizationResult by_images = optimize(nullptr, frame);
+// Where the motion of a moment ago takes the camera; nullopt: nothing that could be held against images.
+std::optional<PosePrior> MapTracker::PriorOf(const MotionPrediction& motion) const {
+  if (!motion.is_steady) return std::nullopt;
   const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
   const double area = world_from_reference.scale * world_from_reference.scale;
-  const Rigid3 reference_from_camera = (world_from_reference.Inverse() * frame.world_from_camera).Pose();
+  const Rigid3 reference_from_expected = last_->reference_from_camera * motion.last_from_current;
+  return PosePrior{(world_from_reference * reference_from_expected).Pose().Inverse(),
+                   (motion.covariance * area).inverse()};
+}
+
+// By the images alone where they fix how far the camera went, else carried by how it moved a moment ago. Which points
+// are outliers is told with the motion: wrong matches that agree on another one can't win.
+MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
+  const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
+  const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
+  if (!prior) return {OptimizeFramePose(options_.pose, nullptr, frame), StepEvidence::kStrong};
+  TrackedFrame carried = frame;
+  const PoseOptimizationResult with_motion = OptimizeFramePose(options_.pose, &*prior, carried);
+  TrackedFrame seen = carried;
+  PoseOptimizationResult by_images = OptimizeFramePose(options_.pose, nullptr, seen);
+  // Unless most points contradict the motion: the camera may have been carried away. That is told, not overruled.
+  if (by_images.num_inliers < kMinShareWithMotion * frame.NumPoints()) {
+    TrackedFrame alone = frame;
+    const PoseOptimizationResult by_all = OptimizeFramePose(options_.pose, nullptr, alone);
+    if (by_images.num_inliers < kMinShareWithMotion * by_all.num_inliers) {
+      by_images = by_all;
+      seen = std::move(alone);
+    }
+  }
+  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const double area = world_from_reference.scale * world_from_reference.scale;
+  const Rigid3 reference_from_camera = (world_from_reference.Inverse() * seen.world_from_camera).Pose();
   const StepEvidence evidence = Judge(*motion, last_->reference_from_camera.Inverse() * reference_from_camera,
                                       TranslationCovariance(by_images.information) / area);
-  // A contradiction is told, not overruled: the camera may have been carried away.
-  if (evidence != StepEvidence::kWeak) return {by_images, evidence};
-
-  matched.world_from_camera =
-      (world_from_reference * (last_->reference_from_camera * motion->last_from_current)).Pose();
-  const PosePrior prior{matched.world_from_camera.Inverse(), (motion->covariance * area).inverse()};
-  const PoseOptimizationResult carried = optimize(&prior, matched);
-  frame = std::move(matched);
-  return {carried, evidence};
+  const bool is_carried = evidence == StepEvidence::kWeak;
+  frame = std::move(is_carried ? carried : seen);
+  return {is_carried ? with_motion : by_images, evidence};
 }
 
 KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
@@ -232,11 +249,13 @@ bool MapTracker::FollowLast(TrackedFrame& frame) const {
   const Rigid3 last_from_current = motion ? motion->last_from_current : Rigid3::Identity();
   const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
   const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
   for (const double widening : {1.0, 2.0, 4.0}) {
     frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
     const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
-    if (num >= options_.min_last_matches && OptimizeFrame(options_.pose, frame) >= options_.min_last_matches / 2)
-      return true;
+    if (num < options_.min_last_matches) continue;
+    const PoseOptimizationResult optimized = OptimizeFramePose(options_.pose, prior ? &*prior : nullptr, frame);
+    if (optimized.num_inliers >= options_.min_last_matches / 2) return true;
   }
   return false;
 }
@@ -281,7 +300,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   reference_ = answer.reference;
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
-  motion_.Reset();
+  ResetMotion();
   last_.emplace(Last{std::move(frame), reference_from_camera});
   return true;
 }
@@ -290,16 +309,22 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
   const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
-  if (lost_since_us_ || interval_s <= 0.0) {
-    motion_.Reset();
+  // After a step that contradicts it, nothing is known of how the camera moves: it may have been carried away.
+  if (lost_since_us_ || interval_s <= 0.0 || pose.evidence == StepEvidence::kContradictory) {
+    ResetMotion();
   } else {
     const double scale = reference_from_world.scale;
     motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera,
                 TranslationCovariance(pose.optimized.information) * scale * scale, interval_s,
-                pose.evidence != StepEvidence::kStrong);
+                pose.evidence == StepEvidence::kWeak);
   }
   lost_since_us_.reset();
   last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence});
+}
+
+void MapTracker::ResetMotion() {
+  motion_.Reset();
+  motion_at_reference_.reset();
 }
 
 // Whether the loss has lasted so long that a new part of the map should begin.
@@ -329,6 +354,16 @@ bool MapTracker::IsKeyframeDue() {
   return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;
 }
 
+// Where a camera that turned so since `reference` was made should be by how it moved then.
+MotionPrior MapTracker::ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const {
+  if (!motion_at_reference_ || reference != reference_ || utime_us <= motion_at_reference_->utime_us) return {};
+  const double interval_s = 1e-6 * static_cast<double>(utime_us - motion_at_reference_->utime_us);
+  const auto motion = motion_at_reference_->model.Predict(interval_s, reference_from_camera.rotation);
+  if (!motion || !motion->is_steady) return {};
+  const Eigen::Matrix3d information = motion->covariance.inverse();
+  return {motion->last_from_current.translation, 0.5 * (information + information.transpose())};
+}
+
 // The frame becomes the reference of those to come.
 KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId reference,
                                              const Rigid3& reference_from_camera) {
@@ -338,6 +373,8 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   keyframe.world_from_camera = frame.world_from_camera;
   keyframe.reference = reference;
   keyframe.reference_from_camera = reference_from_camera;
+  keyframe.expected = ExpectFrom(reference, reference_from_camera, keyframe.features.utime_us);
+  motion_at_reference_ = MotionAt{motion_, keyframe.features.utime_us};
   keyframe.landmarks.resize(frame.points.size());
   for (size_t i = 0; i < frame.points.size(); ++i) {
     const SeenPoint& point = frame.points[i];

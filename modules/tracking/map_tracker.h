@@ -102,6 +102,9 @@ class MapTracker {
   bool Localize(const Frame& view);
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
+  std::optional<PosePrior> PriorOf(const MotionPrediction& motion) const;
+  MotionPrior ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const;
+  void ResetMotion();
   bool FollowLast(TrackedFrame& frame) const;
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
@@ -118,6 +121,11 @@ class MapTracker {
   KeyframeDecision decision_;
   std::optional<Last> last_;  // nullopt: no part of the map is followed
   MotionModel motion_;        // in the reference's units
+  struct MotionAt {
+    MotionModel model;
+    int64_t utime_us = 0;
+  };
+  std::optional<MotionAt> motion_at_reference_;  // as it was when that keyframe was made
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
   Rigid3 world_from_start_;        // camera where the next part of the map begins

@@ -15,6 +15,9 @@ constexpr double kWeakShare = 0.2;      // of the step
 constexpr double kMaxSigmas = 5.0;
 constexpr double kMinShare = 0.7, kMaxShare = 1.4;  // of the predicted length
 
+// From the frame in the middle of a step, on a steady turn, to the one at its beginning.
+Eigen::Quaterniond HalfOf(const Eigen::Quaterniond& turn) { return ExpSO3(0.5 * LogSO3(turn)); }
+
 }  // namespace
 
 void MotionModel::LearnNoise(const Eigen::Vector3d& measured, double interval_s) {
@@ -29,8 +32,10 @@ void MotionModel::LearnNoise(const Eigen::Vector3d& measured, double interval_s)
 
 void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s,
                       bool is_carried) {
-  const Eigen::Vector3d measured = last_from_current.translation / interval_s;
-  const Eigen::Matrix3d variance = covariance / (interval_s * interval_s);
+  const Eigen::Matrix3d middle_from_last = HalfOf(last_from_current.rotation).toRotationMatrix().transpose();
+  const Eigen::Vector3d measured = middle_from_last * last_from_current.translation / interval_s;
+  const Eigen::Matrix3d variance =
+      middle_from_last * covariance * middle_from_last.transpose() / (interval_s * interval_s);
   turn_rate_ = LogSO3(last_from_current.rotation) / interval_s;
   ++num_motions_;
   if (num_motions_ == 1 || is_carried) {
@@ -49,11 +54,17 @@ void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& co
 }
 
 std::optional<MotionPrediction> MotionModel::Predict(double interval_s) const {
+  return Predict(interval_s, ExpSO3(turn_rate_ * interval_s));
+}
+
+std::optional<MotionPrediction> MotionModel::Predict(double interval_s,
+                                                     const Eigen::Quaterniond& last_from_current) const {
   if (num_motions_ == 0) return std::nullopt;
   const Eigen::Matrix3d variance = variance_ + walk_ * interval_s * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d last_from_middle = HalfOf(last_from_current).toRotationMatrix();
   MotionPrediction prediction;
-  prediction.last_from_current = {ExpSO3(turn_rate_ * interval_s), velocity_ * interval_s};
-  prediction.covariance = variance * (interval_s * interval_s);
+  prediction.last_from_current = {last_from_current, last_from_middle * velocity_ * interval_s};
+  prediction.covariance = last_from_middle * variance * last_from_middle.transpose() * (interval_s * interval_s);
   const double squared = velocity_.squaredNorm();
   const double along = velocity_.dot(variance * velocity_);  // |v|^2 times the variance along v
   prediction.is_steady = num_motions_ >= kMinMotions && squared * squared > kMinSteadiness * kMinSteadiness * along;

@@ -1,6 +1,7 @@
 // How the camera moved a moment ago, as a prior for how it moves now.
 //
-// The velocity v of the camera in its own frame is a random walk, and what the poses show of it is noisy:
+// The velocity v of the camera in its own frame (as it stands in the middle of a step) is a random walk, and what the
+// poses show of it is noisy:
 //
 //   v(k+1) = v(k) + walk,  variance q dt an axis;     measured(k) = v(k) + noise,  variance r an axis
 //
@@ -33,8 +34,9 @@ class MotionModel {
   // `is_carried`: the prediction took part in it, so that it tells nothing new about q and r.
   void Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s,
            bool is_carried = false);
-  // nullopt before the first motion.
+  // nullopt before the first motion. The camera turns on as it did, or by `last_from_current`, if that is known.
   std::optional<MotionPrediction> Predict(double interval_s) const;
+  std::optional<MotionPrediction> Predict(double interval_s, const Eigen::Quaterniond& last_from_current) const;
 
  private:
   void LearnNoise(const Eigen::Vector3d& measured, double interval_s);

@@ -35,6 +35,15 @@ struct Layout<shared_keypoint_t> {
 };
 
 template <>
+struct Layout<motion_prior_t> {
+  template <class Fields, class Message, class Value>
+  static void Describe(Fields& fields, Message& message, Value& prior) {
+    fields(message.position_in_reference, prior.position_in_reference);
+    fields(message.information, prior.information);
+  }
+};
+
+template <>
 struct Layout<keyframe_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& keyframe) {
@@ -42,6 +51,7 @@ struct Layout<keyframe_t> {
     fields(message.world_from_camera, keyframe.world_from_camera);
     fields(message.reference, keyframe.reference);
     fields(message.reference_from_camera, keyframe.reference_from_camera);
+    fields(message.expected, keyframe.expected);
     fields.Count(message.num_deltas, keyframe.num_deltas);
     fields.Check(keyframe.id.valid(), "its number is negative");
     fields.Check(keyframe.reference < keyframe.id, "its reference is not older");

@@ -12,6 +12,7 @@ static_assert(std::endian::native == std::endian::little,
               "descriptors and depths are sent least significant byte first");
 
 constexpr double kMaxCoordinate = 1e9;
+constexpr double kMaxInformation = 1e18;
 
 bool IsNear(const double (&coordinates)[3]) {
   // NaN fails the comparison.
@@ -35,6 +36,20 @@ void WriteField(const Eigen::Vector3d& vector, double (&field)[3]) { std::copy(v
 Result<> ReadField(const double (&field)[3], Eigen::Vector3d& vector) {
   vector = {field[0], field[1], field[2]};
   return Require(IsNear(field), "a position is not finite or too far away");
+}
+
+void WriteField(const Eigen::Matrix3d& information, double (&field)[3][3]) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) field[row][column] = information(row, column);
+  }
+}
+Result<> ReadField(const double (&field)[3][3], Eigen::Matrix3d& information) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) information(row, column) = field[row][column];
+  }
+  const bool is_in_range = information.allFinite() && information.cwiseAbs().maxCoeff() <= kMaxInformation &&
+                           information.diagonal().minCoeff() >= 0.0 && information == information.transpose();
+  return Require(is_in_range, "the information of a position is not symmetric, negative or too large");
 }
 
 void WriteField(const Rigid3& transform, rigid3_t& field) {

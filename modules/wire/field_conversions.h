@@ -84,6 +84,10 @@ Result<> ReadField(const std::string& field, std::string& text);
 void WriteField(const Eigen::Vector3d& vector, double (&field)[3]);
 Result<> ReadField(const double (&field)[3], Eigen::Vector3d& vector);
 
+// The information of a position: symmetric, finite, and no more than 10^18 or less than zero along an axis.
+void WriteField(const Eigen::Matrix3d& information, double (&field)[3][3]);
+Result<> ReadField(const double (&field)[3][3], Eigen::Matrix3d& information);
+
 // Translations as positions; quaternions of length 1; scales within 10^-9 .. 10^9.
 void WriteField(const Rigid3& transform, rigid3_t& field);
 Result<> ReadField(const rigid3_t& field, Rigid3& transform);

@@ -99,8 +99,65 @@ TEST_F(LocalAdjustment, BringsADisplacedKeyframeBack) {
     Eigen::Matrix<double, 6, 1> error;
     error << 0.05, -0.03, 0.04, 0.005, -0.004, 0.003;
     Change([&](MapEditor& editor) { editor.MoveKeyframe({9}, Retract(truth, error)); });
-    Change([&](MapEditor& editor) { AdjustLocally({9}, {}, {}, editor); });
+    Change([&](MapEditor& editor) { AdjustLocally({9}, {}, {}, {}, editor); });
     EXPECT_THAT(map().FindKeyframe({9})->world_from_camera, IsNear(truth, 2e-3)) << ToString(sensor);
+  }
+}
+
+// Relative to a keyframe of the window, in its units and axes.
+TEST_F(LocalAdjustment, AnExpectedMotionHoldsAPoseThatNothingElseHolds) {
+  Plant(SensorType::kMono);
+  const Rigid3 reference = map().FindKeyframe({8})->world_from_camera;
+  const Eigen::Vector3d expected = reference.Inverse() * Eigen::Vector3d(world_->Pose(9.0).translation);
+  const KeyframeMotions motions{{{9}, {{8}, {expected, 1e4 * Eigen::Matrix3d::Identity()}}}};
+  const LocalWindowOptions options = FourInner(false);
+  BundleProblem problem = BuildLocalProblem(map(), SelectLocalWindow(map(), {9}, options), options, motions);
+  ASSERT_EQ(problem.constraints.size(), 1U);
+  std::erase_if(problem.observations, [&](const BundleObservation& o) {
+    return problem.poses[static_cast<size_t>(o.pose)].id == KeyframeId{9};
+  });
+  auto& displaced = problem.poses[static_cast<size_t>(problem.constraints[0].to)];
+  ASSERT_EQ(displaced.id, KeyframeId{9});
+  displaced.camera_from_world =
+      (world_->Pose(9.0) * Rigid3{Eigen::Quaterniond::Identity(), {0.1, 0.2, -0.3}}).Inverse();
+  const std::optional<BundleResult> result = AdjustBundle(problem, {});
+  ASSERT_TRUE(result);
+  const Rigid3& adjusted = result->camera_from_world[static_cast<size_t>(problem.constraints[0].to)];
+  EXPECT_LT((adjusted.Inverse().translation - world_->Pose(9.0).translation).norm(), 1e-3);
+}
+
+TEST_F(LocalAdjustment, AnExpectedMotionNeedsBothKeyframesInTheWindow) {
+  Plant(SensorType::kMono);
+  const MotionPrior expected{{0.0, 0.0, 0.5}, Eigen::Matrix3d::Identity()};
+  const LocalWindowOptions options = FourInner(false);
+  const LocalWindow window = SelectLocalWindow(map(), {9}, options);
+  EXPECT_TRUE(BuildLocalProblem(map(), window, options, {{{9}, {{77}, expected}}}).constraints.empty());
+  EXPECT_TRUE(BuildLocalProblem(map(), window, options, {{{5}, {{4}, expected}}}).constraints.empty())
+      << "both are fixed";
+}
+
+// Pairs that only look alike: their rays meet somewhere, and they may be many.
+TEST_F(LocalAdjustment, LandmarksThatFewSeeFollowThePosesAndDontMoveThem) {
+  Plant(SensorType::kMono);
+  std::vector<LandmarkId> few;
+  map().landmarks().ForEach([&](LandmarkId id, const Landmark&) {
+    const std::vector<Observation>& seen = map().ObservationsOf(id);
+    if (seen.size() == 2 && seen.back().keyframe == KeyframeId{9}) few.push_back(id);
+  });
+  ASSERT_GT(few.size(), 10U);
+  const Rigid3 truth = map().FindKeyframe({9})->world_from_camera;
+  Change([&](MapEditor& editor) {
+    for (const LandmarkId id : few) {
+      Landmark landmark = *map().FindLandmark(id);
+      landmark.position_in_world += Eigen::Vector3d(0.2, 0.0, 1.0);
+      editor.ChangeLandmark(id, landmark);
+    }
+  });
+  Change([&](MapEditor& editor) { AdjustLocally({9}, {}, {}, {}, editor); });
+  EXPECT_THAT(map().FindKeyframe({9})->world_from_camera, IsNear(truth, 1e-6));
+  for (const LandmarkId id : few) {
+    const size_t point = planted_->PointOf(map().ObservationsOf(id).front());
+    EXPECT_THAT(map().FindLandmark(id)->position_in_world, IsNear(world_->point(point), 1e-3)) << "they follow";
   }
 }
 
@@ -121,7 +178,7 @@ TEST_F(LocalAdjustment, OutliersLoseTheirObservation) {
     for (size_t i = 0; i < 2; ++i) editor.RemoveObservation(landmarks[i], at[i]);
     for (size_t i = 0; i < 2; ++i) editor.AddObservation(landmarks[i], at[1 - i]);
   });
-  Change([&](MapEditor& editor) { AdjustLocally({9}, {}, {}, editor); });
+  Change([&](MapEditor& editor) { AdjustLocally({9}, {}, {}, {}, editor); });
   for (const LandmarkId id : landmarks) EXPECT_FALSE(map().IsSeenBy(id, {9}));
   EXPECT_EQ(map().ObservationsOf(landmarks[0]).size(), num_before - 1);
 }

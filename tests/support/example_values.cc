@@ -217,6 +217,20 @@ bool AreSame(const FeatureFrame& a, const FeatureFrame& b) {
          a.calibration == b.calibration && a.keypoints == b.keypoints && a.descriptors == b.descriptors;
 }
 
+namespace {
+
+MotionPrior DrawMotionPrior(std::mt19937& generator) {
+  MotionPrior prior{.position_in_reference = DrawPose(generator).translation};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      prior.information(row, column) = prior.information(column, row) = DrawReal(generator, 0, 9);
+    }
+  }
+  return prior;
+}
+
+}  // namespace
+
 template <>
 KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int size) {
   const int id = Draw(generator, 10, 99);
@@ -226,6 +240,7 @@ KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int 
                                .landmarks = {},
                                .reference = {Draw(generator, -1, id - 1)},
                                .reference_from_camera = DrawPose(generator),
+                               .expected = DrawMotionPrior(generator),
                                .shared = {},
                                .num_deltas = Draw(generator, 0, 99)};
   for (size_t i = 0; i < keyframe.features.keypoints.size(); ++i) {
@@ -247,6 +262,8 @@ bool AreSame(const KeyframeObservation& a, const KeyframeObservation& b) {
   return a.id == b.id && AreSame(a.features, b.features) && AreSamePose(a.world_from_camera, b.world_from_camera) &&
          a.landmarks == b.landmarks && a.reference == b.reference &&
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_deltas == b.num_deltas &&
+         a.expected.position_in_reference == b.expected.position_in_reference &&
+         a.expected.information == b.expected.information &&
          std::equal(a.shared.begin(), a.shared.end(), b.shared.begin(), b.shared.end(), is_same);
 }
 

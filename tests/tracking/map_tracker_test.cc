@@ -13,7 +13,7 @@ namespace {
 struct Outcome {
   std::vector<PoseEstimate> poses;
   std::string map_sha256;
-  int num_keyframes = 0;
+  std::vector<KeyframeObservation> keyframes;
   Mapper mapper{MapperOptions{}};
 };
 
@@ -32,7 +32,7 @@ void Follow(SyntheticWorld world, int64_t num_frames, int64_t delay_frames, cons
     for (const KeyframeObservation& keyframe : result.keyframes) {
       time.KeyframeSent(keyframe.id, features.frame);
       time.Receive(std::make_shared<const MapDelta>(outcome.mapper.Process(keyframe)));
-      ++outcome.num_keyframes;
+      outcome.keyframes.push_back(keyframe);
     }
   }
   outcome.map_sha256 = outcome.mapper.map().Sha256Hex();
@@ -53,7 +53,22 @@ TEST(MapTracker, FollowsAStereoDrive) {
     const Rigid3 truth = world.Pose(0.0).Inverse() * world.Pose(static_cast<double>(pose.frame.value));
     EXPECT_LT((FinalPose(outcome, pose).translation - truth.translation).norm(), 0.05) << pose.frame.value;
   }
-  EXPECT_GT(outcome.num_keyframes, 3);
+  EXPECT_GT(outcome.keyframes.size(), 3U);
+}
+
+TEST(MapTracker, KeyframesOfASteadyCameraSayWhereItWasExpected) {
+  Outcome outcome;
+  Follow(SyntheticWorld(SensorType::kStereo, 0.3), 40, 3, {}, outcome);
+  EXPECT_FALSE(outcome.keyframes.front().expected.is_known()) << "nothing was seen of its motion yet";
+  int num_known = 0;
+  for (const KeyframeObservation& keyframe : outcome.keyframes) {
+    if (!keyframe.expected.is_known()) continue;
+    ++num_known;
+    const Eigen::Vector3d error = keyframe.expected.position_in_reference - keyframe.reference_from_camera.translation;
+    EXPECT_LT(error.norm(), 0.1 * keyframe.reference_from_camera.translation.norm()) << keyframe.id.value;
+    EXPECT_LT(error.dot(keyframe.expected.information * error), 3.0 * 25.0) << "five sigma an axis";
+  }
+  EXPECT_GT(num_known, 2);
 }
 
 TEST(MapTracker, FollowsAMonoDriveUpToScale) {

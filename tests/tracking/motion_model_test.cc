@@ -26,14 +26,25 @@ MotionModel Driven(double step, double noise = 1e-3, int num = 30) {
 
 TEST(MotionModel, PredictsNothingBeforeTheFirstMotion) { EXPECT_FALSE(MotionModel().Predict(kInterval)); }
 
+// 0.5 along a turn of 0.02 rad each: after n motions n / 2 away on a circle, in the direction of its chord.
 TEST(MotionModel, GoesOnInTimeNotInFrames) {
   const MotionModel model = Driven(0.5, 0.0);
   for (const int num_intervals : {1, 3}) {
     const auto motion = model.Predict(num_intervals * kInterval);
     ASSERT_TRUE(motion);
-    EXPECT_NEAR(motion->last_from_current.translation.z(), 0.5 * num_intervals, 1e-12);
+    const Eigen::Vector3d& way = motion->last_from_current.translation;
+    EXPECT_NEAR(way.norm(), 0.5 * num_intervals, 1e-12);
+    EXPECT_NEAR(std::atan2(way.x(), way.z()), 0.01 * (num_intervals - 1), 1e-12);
     EXPECT_NEAR(LogSO3(motion->last_from_current.rotation).y(), 0.02 * num_intervals, 1e-12);
   }
+}
+
+TEST(MotionModel, FollowsATurnThatIsKnown) {
+  const auto motion = Driven(0.5, 0.0).Predict(kInterval, ExpSO3({0.0, 0.3, 0.0}));
+  ASSERT_TRUE(motion);
+  const Eigen::Vector3d& way = motion->last_from_current.translation;
+  EXPECT_NEAR(std::atan2(way.x(), way.z()), 0.15 - 0.01, 1e-12) << "the chord of the turn, not its tangent";
+  EXPECT_NEAR(LogSO3(motion->last_from_current.rotation).y(), 0.3, 1e-12);
 }
 
 TEST(MotionModel, IsAsUncertainAsTheLastSecondsWereRestless) {

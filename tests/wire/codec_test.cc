@@ -176,6 +176,9 @@ TEST(Codec, FeaturesOutOfRangeAreRefused) {
 TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.reference = keyframe.id; });
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].other = keyframe.id; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.expected.information(0, 1) += 1.0; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.expected.information(2, 2) = -1.0; });
+  ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.expected.information(1, 1) = kNan; });
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.shared[0].keypoint = 1 << 19; });
   ExpectRefused<KeyframeObservation>(
       [](KeyframeObservation& keyframe) { keyframe.shared[0].position_in_other.x() = kNan; });
