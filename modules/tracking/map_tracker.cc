@@ -15,6 +15,7 @@ namespace {
 
 // Of the points that agree on a pose by themselves: fewer that agree with the motion of a moment ago contradict it.
 constexpr double kMinShareWithMotion = 0.5;
+constexpr double kDriftInterval_s = 0.1;
 
 // A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark. `covariance`: of the
 // point, if its depth isn't known by the view itself.
@@ -136,9 +137,10 @@ bool MapTracker::StartFromDepth(const Frame& view, std::vector<KeyframeObservati
 
 // Both frames become keyframes; the points go with the second one, as seen by a keypoint of each.
 bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
-  const std::optional<MonoStart> start = initializer_.Add(view);
+  std::optional<MonoStart> start = initializer_.Add(view);
   if (!start) return false;
   initializer_ = MonoInitializer(options_.start);
+  TakeOverMotion(*start);
   const KeyframeId first_id = next_keyframe_;
   TrackedFrame first(start->first), second(start->second);
   first.world_from_camera = world_from_start_;
@@ -158,6 +160,23 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   last_.emplace(Last{std::move(second), Rigid3::Identity()});
   keyframes.push_back(MakeKeyframe(last_->frame, first_id, first_from_second));
   return true;
+}
+
+// Two views don't know how far apart they are: as far as the camera goes in that time, if it still moves as it did when
+// it was lost, and on its way from there. That is a guess until a loop joins the parts.
+void MapTracker::TakeOverMotion(MonoStart& start) {
+  if (!drift_) return;
+  const int64_t first_us = start.first->features().utime_us, second_us = start.second->features().utime_us;
+  const double interval_s = 1e-6 * static_cast<double>(second_us - first_us);
+  const double scale = drift_->velocity.norm() * interval_s / start.second_from_first.translation.norm();
+  start.second_from_first.translation *= scale;
+  for (MonoStart::Point& point : start.points) {
+    point.point.point_in_world *= scale;
+    point.point.covariance *= scale * scale;
+  }
+  const double lost_s = 1e-6 * static_cast<double>(first_us - drift_->utime_us);
+  world_from_start_ = world_from_start_ * Rigid3{Eigen::Quaterniond::Identity(), drift_->velocity * lost_s};
+  drift_.reset();
 }
 
 // The map may have changed: the last frame keeps its pose relative to its reference, and its points move with the map.
@@ -327,12 +346,22 @@ void MapTracker::ResetMotion() {
   motion_at_reference_.reset();
 }
 
+// Of the last frame that was tracked; nullopt: it did not move steadily.
+std::optional<MapTracker::Drift> MapTracker::DriftNow() const {
+  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const auto motion = motion_.Predict(kDriftInterval_s, Eigen::Quaterniond::Identity());
+  if (!motion || !motion->is_steady) return std::nullopt;
+  return Drift{world_from_reference.scale * motion->last_from_current.translation / kDriftInterval_s,
+               last_->frame.view->features().utime_us};
+}
+
 // Whether the loss has lasted so long that a new part of the map should begin.
 bool MapTracker::NoteLoss(int64_t utime_us) {
   if (!lost_since_us_) lost_since_us_ = utime_us;
   if (utime_us - *lost_since_us_ <= options_.max_lost_us || !options_.makes_keyframes) return false;
   if (last_) {
     world_from_start_ = last_->frame.world_from_camera;
+    drift_ = DriftNow();
     last_.reset();
     initializer_ = MonoInitializer(options_.start);
   }

@@ -86,6 +86,17 @@ class MapTracker {
     StepEvidence evidence = StepEvidence::kStrong;
   };
 
+  // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
+  struct Drift {
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // units/s, in its own axes
+    int64_t utime_us = 0;
+  };
+
+  struct MotionAt {
+    MotionModel model;
+    int64_t utime_us = 0;
+  };
+
   struct FramePose {
     PoseOptimizationResult optimized;
     StepEvidence evidence = StepEvidence::kStrong;
@@ -105,6 +116,8 @@ class MapTracker {
   std::optional<PosePrior> PriorOf(const MotionPrediction& motion) const;
   MotionPrior ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const;
   void ResetMotion();
+  std::optional<Drift> DriftNow() const;
+  void TakeOverMotion(MonoStart& start);
   bool FollowLast(TrackedFrame& frame) const;
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
@@ -119,16 +132,13 @@ class MapTracker {
   MapReplica replica_;
   MonoInitializer initializer_;
   KeyframeDecision decision_;
-  std::optional<Last> last_;  // nullopt: no part of the map is followed
-  MotionModel motion_;        // in the reference's units
-  struct MotionAt {
-    MotionModel model;
-    int64_t utime_us = 0;
-  };
+  std::optional<Last> last_;                     // nullopt: no part of the map is followed
+  MotionModel motion_;                           // in the reference's units
   std::optional<MotionAt> motion_at_reference_;  // as it was when that keyframe was made
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
   Rigid3 world_from_start_;        // camera where the next part of the map begins
+  std::optional<Drift> drift_;     // of the last loss
   int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last

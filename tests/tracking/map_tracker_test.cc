@@ -98,6 +98,36 @@ TEST(MapTracker, SameFramesGiveTheSameMapAndDroppedOnesDoNotStopIt) {
   for (const PoseEstimate& pose : dropped.poses) EXPECT_EQ(pose.state, TrackingState::kTracked) << pose.frame.value;
 }
 
+// Mono: two seconds without images, then nothing that was seen before. The new part is about where the camera went on
+// to, in about the old scale.
+TEST(MapTracker, ANewPartTakesOverScaleAndPositionFromTheMotionBeforeTheLoss) {
+  SyntheticWorld world(SensorType::kMono, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  Mapper mapper{MapperOptions{}};
+  std::vector<PoseEstimate> before, after;
+  for (int64_t step = 0; step < 65; ++step) {
+    FeatureFrame features = world.Take(step).features;
+    if (step >= 25 && step < 45) features.keypoints.clear(), features.descriptors.clear();
+    if (step >= 45) {
+      for (Descriptor& descriptor : features.descriptors) descriptor[0] ^= ~uint64_t{0}, descriptor[2] ^= ~uint64_t{0};
+    }
+    const MapTrackingResult result = tracker.Track(features);
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+    }
+    if (result.pose.state == TrackingState::kTracked) (step < 25 ? before : after).push_back(result.pose);
+  }
+  ASSERT_GT(before.size(), 10U);
+  ASSERT_GT(after.size(), 10U);
+  const auto length = [](const PoseEstimate& a, const PoseEstimate& b) {
+    return (b.world_from_camera.translation - a.world_from_camera.translation).norm() /
+           static_cast<double>(b.frame.value - a.frame.value);
+  };
+  const double step = length(before[5], before.back());
+  EXPECT_NEAR(length(after[1], after.back()) / step, 1.0, 0.15);
+  EXPECT_NEAR(length(before.back(), after[1]) / step, 1.0, 0.15);
+}
+
 TEST(MapTracker, FindsItselfAgainAfterBlindFrames) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
   MapTracker tracker{MapTrackerOptions{}};
