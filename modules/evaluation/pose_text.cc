@@ -6,6 +6,14 @@
 namespace tessera {
 namespace {
 
+std::string NumberText(double number) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.9f", number);
+  return text;
+}
+
+}  // namespace
+
 // Integers throughout: a double holds the microseconds of today's epoch only just.
 std::string SecondsText(int64_t utime_us) {
   char text[40];
@@ -14,14 +22,6 @@ std::string SecondsText(int64_t utime_us) {
   std::snprintf(text, sizeof text, "%s%" PRId64 ".%06" PRId64, sign, magnitude / 1'000'000, magnitude % 1'000'000);
   return text;
 }
-
-std::string NumberText(double number) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.9f", number);
-  return text;
-}
-
-}  // namespace
 
 std::string TumRow(int64_t utime_us, const Rigid3& world_from_camera) {
   const Eigen::Vector3d& t = world_from_camera.translation;

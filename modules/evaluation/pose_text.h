@@ -8,6 +8,9 @@
 
 namespace tessera {
 
+// Seconds to the microsecond.
+std::string SecondsText(int64_t utime_us);
+
 // TUM: `timestamp tx ty tz qx qy qz qw` with the time in seconds to the microsecond, and a line break.
 std::string TumRow(int64_t utime_us, const Rigid3& world_from_camera);
 

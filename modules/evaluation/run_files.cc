@@ -24,6 +24,23 @@ std::string TumText(const std::vector<StampedPose>& poses) {
   return text;
 }
 
+// Comments for trajectory.txt, which readers of TUM files pass over; none if all frames are placed in one map.
+std::string PartsText(const std::vector<PartRecord>& parts) {
+  if (parts.size() < 2) return "";
+  std::string text =
+      "# The map has " + std::to_string(parts.size()) +
+      " parts that no loop has joined: the positions (mono: and the scale) of one mean little in another.\n";
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const PartRecord& part = parts[i];
+    text += "# part " + std::to_string(i + 1) + (part.is_main ? " (main): " : ": ") + std::to_string(part.num_frames) +
+            " frames, " + std::to_string(part.num_keyframes) + " keyframes";
+    if (part.first)
+      text += ", from " + SecondsText(part.first->utime_us) + " s to " + SecondsText(part.last->utime_us) + " s";
+    text += "\n";
+  }
+  return text;
+}
+
 std::string KittiText(const std::vector<Rigid3>& poses) {
   std::string text;
   for (const Rigid3& pose : poses) {
@@ -180,7 +197,7 @@ void MakeRunFolder(const std::string& folder) {
 
 void WriteRun(const RunRecord& record, const std::string& folder) {
   MakeRunFolder(folder);
-  WriteFile(folder + "/trajectory.txt", TumText(record.Trajectory()));
+  WriteFile(folder + "/trajectory.txt", PartsText(record.Parts()) + TumText(record.Trajectory()));
   WriteFile(folder + "/trajectory_live.txt", TumText(record.LiveTrajectory()));
   WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame()));
   WriteFile(folder + "/keyframes.txt", TumText(record.Keyframes()));

@@ -114,6 +114,22 @@ TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {
   EXPECT_EQ(std::count(truth.begin(), truth.end(), '\n'), 4);
 }
 
+TEST_F(RunFilesTest, TrajectorySaysThatItsPartsAreNotJoined) {
+  RunRecord record = SmallRun();
+  ASSERT_EQ(record.Parts().size(), 1U);
+  MapDelta delta{.number = record.map().next_delta(), .answers = {99}};
+  delta.new_keyframes.push_back({{99}, {}, Rigid3{}, std::make_shared<FeatureFrame>()});
+  Map after = record.map();
+  (void)after.Apply(delta);
+  delta.hash = after.hash();
+  ASSERT_THAT(record.ApplyDelta(delta), IsSuccess());
+  WriteRun(record, folder_);
+  const std::string text = Read("trajectory.txt");
+  EXPECT_EQ(text.rfind("# The map has 2 parts that no loop has joined", 0), 0U) << text;
+  EXPECT_NE(text.find("\n# part 2: 0 frames, 1 keyframes\n# timestamp"), std::string::npos) << text;
+  EXPECT_EQ(Read("trajectory_live.txt").rfind("# timestamp", 0), 0U);
+}
+
 TEST_F(RunFilesTest, FramesCsvHasARowPerFrame) {
   EXPECT_EQ(FramesCsv(SmallRun()),
             "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,"
