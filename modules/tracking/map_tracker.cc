@@ -72,6 +72,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
     result.pose.is_relocalized = before == State::kLost || is_answered;
     result.pose.state = TrackingState::kTracked;
     if (options_.makes_keyframes && IsKeyframeDue()) {
+      if (view->baseline_m() == 0.0) AddScaleDrift(last_->reference_from_camera);
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
     }
   } else if (may_ask && CanAskFor(*view)) {
@@ -140,6 +141,7 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   std::optional<MonoStart> start = initializer_.Add(view);
   if (!start) return false;
   initializer_ = MonoInitializer(options_.start);
+  scale_variance_ = 0.0;
   TakeOverMotion(*start);
   const KeyframeId first_id = next_keyframe_;
   TrackedFrame first(start->first), second(start->second);
@@ -329,16 +331,23 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
   // After a step that contradicts it, nothing is known of how the camera moves: it may have been carried away.
+  const Eigen::Matrix3d covariance =
+      TranslationCovariance(pose.optimized.information) * reference_from_world.scale * reference_from_world.scale;
   if (lost_since_us_ || interval_s <= 0.0 || pose.evidence == StepEvidence::kContradictory) {
     ResetMotion();
   } else {
-    const double scale = reference_from_world.scale;
-    motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera,
-                TranslationCovariance(pose.optimized.information) * scale * scale, interval_s,
+    motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera, covariance, interval_s,
                 pose.evidence == StepEvidence::kWeak);
   }
   lost_since_us_.reset();
-  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence});
+  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance});
+}
+
+void MapTracker::AddScaleDrift(const Rigid3& reference_from_camera) {
+  const Eigen::Vector3d step = reference_from_camera.rotation.inverse() * reference_from_camera.translation;
+  const double squared = step.squaredNorm();
+  if (squared > 0.0 && last_->covariance.allFinite())
+    scale_variance_ += step.dot(last_->covariance * step) / (squared * squared);
 }
 
 void MapTracker::ResetMotion() {

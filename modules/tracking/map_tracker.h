@@ -6,6 +6,7 @@
 // the tracker triangulated itself are used: mono's first ones, and near ones with depth.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -68,6 +69,13 @@ class MapTracker {
   KeyframeId last_keyframe() const { return {next_keyframe_.value - 1}; }
 
   const Map& map() const { return replica_.map(); }
+  // Mono: by how much the scale may have drifted since this part of the map began, as a share (a standard deviation,
+  // without regard to loops): the errors of the steps from keyframe to keyframe, along them, taken as independent,
+  //
+  //   drift^2 = sum over keyframes of (sigma_step / |step|)^2
+  //
+  // 0 where depth is measured.
+  double scale_drift() const { return std::sqrt(scale_variance_); }
 
  private:
   using Frame = std::shared_ptr<const FrameView>;
@@ -84,6 +92,7 @@ class MapTracker {
     TrackedFrame frame;
     Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
     StepEvidence evidence = StepEvidence::kStrong;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the camera's center, in its axes and those units
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -118,6 +127,7 @@ class MapTracker {
   void ResetMotion();
   std::optional<Drift> DriftNow() const;
   void TakeOverMotion(MonoStart& start);
+  void AddScaleDrift(const Rigid3& reference_from_camera);
   bool FollowLast(TrackedFrame& frame) const;
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
@@ -139,6 +149,7 @@ class MapTracker {
   KeyframeId reference_;
   Rigid3 world_from_start_;        // camera where the next part of the map begins
   std::optional<Drift> drift_;     // of the last loss
+  double scale_variance_ = 0.0;    // of the logarithm of the scale
   int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last

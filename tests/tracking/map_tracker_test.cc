@@ -98,6 +98,25 @@ TEST(MapTracker, SameFramesGiveTheSameMapAndDroppedOnesDoNotStopIt) {
   for (const PoseEstimate& pose : dropped.poses) EXPECT_EQ(pose.state, TrackingState::kTracked) << pose.frame.value;
 }
 
+TEST(MapTracker, MonoSaysByHowMuchTheScaleMayHaveDrifted) {
+  const auto drift_after = [](SensorType sensor, double noise_px, int64_t num_frames) {
+    SyntheticWorld world(sensor, noise_px);
+    MapTracker tracker{MapTrackerOptions{}};
+    Mapper mapper{MapperOptions{}};
+    for (int64_t step = 0; step < num_frames; ++step) {
+      for (const KeyframeObservation& keyframe : tracker.Track(world.Take(step).features).keyframes) {
+        EXPECT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+      }
+    }
+    return tracker.scale_drift();
+  };
+  EXPECT_EQ(drift_after(SensorType::kStereo, 0.3, 40), 0.0);
+  const double early = drift_after(SensorType::kMono, 0.3, 20), late = drift_after(SensorType::kMono, 0.3, 40);
+  EXPECT_GT(early, 0.0);
+  EXPECT_GT(late, early);
+  EXPECT_LT(late, 0.1);
+}
+
 // Mono: two seconds without images, then nothing that was seen before. The new part is about where the camera went on
 // to, in about the old scale.
 TEST(MapTracker, ANewPartTakesOverScaleAndPositionFromTheMotionBeforeTheLoss) {

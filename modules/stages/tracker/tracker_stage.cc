@@ -91,6 +91,7 @@ void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
   };
   for (TrackerAction& action : actions) std::visit(perform, action);
   context_.SetValue("keyframes_sent", static_cast<double>(session_.num_keyframes()));
+  context_.SetValue("scale_drift", session_.scale_drift());
 }
 
 void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {

@@ -24,7 +24,7 @@ def num_loops(result: Result) -> int | None:
 
 def headline(result: Result) -> list[str]:
     """Sentences, the most important first."""
-    sentences = [_tracked(result), _error(result), _speed(result), _loops(result), _failures(result)]
+    sentences = [_tracked(result), _error(result), _speed(result), _loops(result), _drift(result), _failures(result)]
     return [sentence for sentence in sentences if sentence]
 
 
@@ -71,6 +71,17 @@ def _loops(result: Result) -> str:
     if loops is None:
         return ""
     return f"{count(loops, 'loop')} {'was' if loops == 1 else 'were'} closed." if loops else "No loop was closed."
+
+
+def _drift(result: Result) -> str:
+    """By how much the scale of mono may have changed; loops take some of it back."""
+    drift = (result.summary.get("stage_values") or {}).get("tracker", {}).get("scale_drift")
+    if not drift or result.summary.get("sensor") != "mono":
+        return ""
+    loops = ", which loops have corrected in part" if num_loops(result) else ""
+    return (
+        f"The scale may have drifted by about {100 * drift:.0f} % since the map began (one standard deviation){loops}."
+    )
 
 
 def _failures(result: Result) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from helpers.made_run import LOST, NUM_FRAMES, write_run
 from tessera_cli.report.html_report import TEMPLATES, write_report
-from tessera_cli.report.sentences import remarks
+from tessera_cli.report.sentences import headline, remarks
 from tessera_cli.runs.run_folder import Result, read_pair, read_run
 
 VOID = {"meta", "wbr", "link", "br", "hr", "img", "input"}
@@ -187,6 +187,19 @@ def test_a_run_without_ground_truth(tmp_path: Path) -> None:
     words = page.root.all("main")[0].words()
     assert "no ground truth" in words and "map units" in words
     assert len(page.root.all("figure")) == FIGURES_OF_A_RUN - 1
+
+
+def test_the_drift_of_the_scale_is_told_of_mono_alone(tmp_path: Path) -> None:
+    values = {"tracker": {"scale_drift": 0.124}}
+    for sensor, loops, words in [
+        ("mono", False, "drifted by about 12 % since the map began (one standard deviation)."),
+        ("mono", True, "(one standard deviation), which loops have corrected in part."),
+        ("stereo", False, ""),
+    ]:
+        folder = write_run(tmp_path / f"{sensor} {loops}", loops=loops, sensor=sensor, stage_values=values)
+        told = [sentence for sentence in headline(read_run(folder)) if "scale may" in sentence]
+        assert len(told) == bool(words)
+        assert not told or words in told[0]
 
 
 def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:
