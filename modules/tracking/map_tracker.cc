@@ -346,8 +346,8 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
 void MapTracker::AddScaleDrift(const Rigid3& reference_from_camera) {
   const Eigen::Vector3d step = reference_from_camera.rotation.inverse() * reference_from_camera.translation;
   const double squared = step.squaredNorm();
-  if (squared > 0.0 && last_->covariance.allFinite())
-    scale_variance_ += step.dot(last_->covariance * step) / (squared * squared);
+  const double variance = step.dot(last_->covariance * step) / (squared * squared);  // of the logarithm of its length
+  if (variance > 0.0 && std::isfinite(variance)) scale_variance_ += variance;
 }
 
 void MapTracker::ResetMotion() {
