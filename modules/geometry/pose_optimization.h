@@ -26,7 +26,8 @@ struct PosePrior {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // of the center, in the camera's axes; 1 / m^2
 };
 
-// Of the information about the translation, but at least three times an observation's mean share.
+// The greatest share of the information about the translation that one observation may have. Of fewer than 150
+// observations, each may have three times the mean share.
 inline constexpr double kMaxLeverage = 0.02;
 
 struct PoseOptimizationOptions {

@@ -56,21 +56,23 @@ void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size
   }
 }
 
+// Index of the keyframe among the poses, in whatever order; their number: not in the window.
+size_t FindPose(const BundleProblem& problem, KeyframeId id) {
+  const auto found =
+      std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& pose) { return pose.id == id; });
+  return static_cast<size_t>(found - problem.poses.begin());
+}
+
 // Constraints of the double window. Two outer poses have one constraint, whichever of them chose the other.
 void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
   const double rad_per_px = kKeypointSigmaPx / problem.calibration.fx_px;
-  const auto index_of = [&](KeyframeId id) {
-    const auto found =
-        std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& pose) { return pose.id == id; });
-    return static_cast<size_t>(found - problem.poses.begin());
-  };
   std::set<std::pair<size_t, size_t>> constrained;
   for (size_t i = num_inner; i < problem.poses.size(); ++i) {
     const Keyframe& keyframe = *map.FindKeyframe(problem.poses[i].id);
     const double depth = MedianDepth(map, keyframe);
     int num_constraints = 0;
     for (const KeyframeId id : map.Covisible(problem.poses[i].id, static_cast<int>(keyframe.covisible.size()))) {
-      const size_t other = index_of(id);
+      const size_t other = FindPose(problem, id);
       if (other == problem.poses.size()) continue;
       if (num_constraints++ == kMaxConstraints) break;
       if (!constrained.insert(std::minmax(i, other)).second) continue;
@@ -88,15 +90,11 @@ void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
 
 // Nothing is expected of the rotation.
 void AddMotions(const Map& map, const KeyframeMotions& motions, BundleProblem& problem) {
-  const auto index_of = [&](KeyframeId id) {
-    const auto found =
-        std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& pose) { return pose.id == id; });
-    return static_cast<int>(found - problem.poses.begin());
-  };
   const auto num_poses = static_cast<int>(problem.poses.size());
   for (int to = 0; to < num_poses; ++to) {
     const auto motion = motions.find(problem.poses[Index(to)].id);
-    const int from = motion != motions.end() ? index_of(motion->second.reference) : num_poses;
+    const int from =
+        motion != motions.end() ? static_cast<int>(FindPose(problem, motion->second.reference)) : num_poses;
     if (from == num_poses || (problem.poses[Index(from)].is_fixed && problem.poses[Index(to)].is_fixed)) continue;
     const double scale = map.FindKeyframe(motion->second.reference)->scale;
     const Rigid3 to_from_from =

@@ -222,10 +222,12 @@ double MapTracker::SinceLast(const FrameView& view) const {
   return 1e-6 * static_cast<double>(view.features().utime_us - last_->frame.view->features().utime_us);
 }
 
+Sim3 MapTracker::WorldFromReference() const { return replica_.WorldFromKeyframe(reference_).value_or(Sim3{}); }
+
 // Where the motion of a moment ago takes the camera; nullopt: nothing that could be held against images.
 std::optional<PosePrior> MapTracker::PriorOf(const MotionPrediction& motion) const {
   if (!motion.is_steady) return std::nullopt;
-  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const Sim3 world_from_reference = WorldFromReference();
   const double area = world_from_reference.scale * world_from_reference.scale;
   const Rigid3 reference_from_expected = last_->reference_from_camera * motion.last_from_current;
   return PosePrior{(world_from_reference * reference_from_expected).Pose().Inverse(),
@@ -251,7 +253,7 @@ MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const 
       seen = std::move(alone);
     }
   }
-  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const Sim3 world_from_reference = WorldFromReference();
   const double area = world_from_reference.scale * world_from_reference.scale;
   const Rigid3 reference_from_camera = (world_from_reference.Inverse() * seen.world_from_camera).Pose();
   const StepEvidence evidence = Judge(*motion, last_->reference_from_camera.Inverse() * reference_from_camera,
@@ -269,7 +271,7 @@ bool MapTracker::FollowLast(TrackedFrame& frame) const {
   const std::optional<MotionPrediction> motion = PredictMotion(*frame.view);
   const Rigid3 last_from_current = motion ? motion->last_from_current : Rigid3::Identity();
   const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
-  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const Sim3 world_from_reference = WorldFromReference();
   const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
   for (const double widening : {1.0, 2.0, 4.0}) {
     frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
@@ -327,7 +329,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
 }
 
 void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
-  const Sim3 reference_from_world = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Inverse();
+  const Sim3 reference_from_world = WorldFromReference().Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
   // After a step that contradicts it, nothing is known of how the camera moves: it may have been carried away.
@@ -357,7 +359,7 @@ void MapTracker::ResetMotion() {
 
 // Of the last frame that was tracked; nullopt: it did not move steadily.
 std::optional<MapTracker::Drift> MapTracker::DriftNow() const {
-  const Sim3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{});
+  const Sim3 world_from_reference = WorldFromReference();
   const auto motion = motion_.Predict(kDriftInterval_s, Eigen::Quaterniond::Identity());
   if (!motion || !motion->is_steady) return std::nullopt;
   return Drift{world_from_reference.scale * motion->last_from_current.translation / kDriftInterval_s,
@@ -386,7 +388,7 @@ bool MapTracker::IsKeyframeDue() {
     if (!point || point->z() > near_m) continue;
     (frame.points[Index(i)].valid() ? near.num_known : near.num_new) += 1;
   }
-  const Rigid3 world_from_reference = replica_.WorldFromKeyframe(reference_).value_or(Sim3{}).Pose();
+  const Rigid3 world_from_reference = WorldFromReference().Pose();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
   const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near);
   return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;

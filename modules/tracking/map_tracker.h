@@ -120,6 +120,7 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
   bool Localize(const Frame& view);
+  Sim3 WorldFromReference() const;                // identity before there is a reference
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
   std::optional<PosePrior> PriorOf(const MotionPrediction& motion) const;

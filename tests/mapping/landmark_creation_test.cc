@@ -104,12 +104,15 @@ TEST(CreateFromPairs, APointWithoutParallaxStandsInItsDirection) {
 
 TEST(CreateFromPairs, OnlyParallaxThatStandsOutOfTheNoiseIsTakenAtItsWord) {
   PartlyKnownMap world(SensorType::kMono, {0, 3});
+  int num_known = 0;
   for (const LandmarkId id : world.Run(CreateFromPairs, {.min_parallax_sigmas = 12.0, .min_parallax_per_turn = 0.0})) {
     const double error = (world.Position(id) - world.Truth(id)).norm();
     if (world.Parallax(id) > 12.0 * world.ParallaxSigma(id)) {
       EXPECT_LT(error, 0.02);
+      ++num_known;
     }
   }
+  EXPECT_GT(num_known, 10);
 }
 
 // What is systematically wrong in images grows with the way of a keypoint through them.
