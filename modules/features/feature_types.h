@@ -27,7 +27,7 @@ struct FeatureOptions {
 
   int num_features = 2000;      // keypoints per image after selection
   int num_levels = kNumLevels;  // pyramid levels; each is 5/6 of the one below in both directions (scale 1.2)
-  int min_score = 7;            // lowest corner score (FAST: intensity difference, 0..255) that counts
+  int min_score = 4;            // lowest corner score (FAST: intensity difference, 0..255) that counts
   int max_disparity_px = 128;   // stereo: widest search along the row, in level-0 pixels
 
   bool operator==(const FeatureOptions&) const = default;
