@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "loop_closing/link_covariance.h"
 #include "map/spanning_tree.h"
 #include "measurement/landmark_view.h"
 
@@ -15,8 +16,7 @@ namespace {
 Sim3 PoseOf(const Map& map, KeyframeId id) { return Sim3::From(map.FindKeyframe(id)->world_from_camera); }
 
 // Pairs of keyframes of the part that an edge joins, the older one first.
-std::set<std::pair<KeyframeId, KeyframeId>> EssentialPairs(const Map& map, const std::map<KeyframeId, int>& node_of,
-                                                           int min_shared) {
+std::vector<KeyframePair> EssentialLinks(const Map& map, const std::map<KeyframeId, int>& node_of, int min_shared) {
   std::set<std::pair<KeyframeId, KeyframeId>> pairs;
   const auto add = [&](KeyframeId a, KeyframeId b) {
     if (node_of.contains(a) && node_of.contains(b)) pairs.insert(std::minmax(a, b));
@@ -29,7 +29,9 @@ std::set<std::pair<KeyframeId, KeyframeId>> EssentialPairs(const Map& map, const
     }
   }
   for (const ClosedLoop& loop : map.closed_loops()) add(loop.current, loop.matched);
-  return pairs;
+  std::vector<KeyframePair> links;
+  for (const auto& [older, newer] : pairs) links.push_back({older, newer});
+  return links;
 }
 
 // The part that began later moves: C = world_from_matched * matched_from_current * current_from_world, or its inverse.
@@ -58,14 +60,18 @@ PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const V
   PoseGraphProblem problem;
   problem.has_scale = map.FindKeyframe(current)->features->calibration.sensor == SensorType::kMono;
   const KeyframeId root = RootOf(map, current);
+  const std::vector<KeyframeId> part = MapPartOf(map, current);
   std::map<KeyframeId, int> node_of;
-  for (const KeyframeId id : MapPartOf(map, current)) {
+  for (const KeyframeId id : part) {
     node_of[id] = static_cast<int>(problem.nodes.size());
     problem.nodes.push_back({id, PoseOf(map, id), id == root});
   }
-  for (const auto& [older, newer] : EssentialPairs(map, node_of, options.min_shared_landmarks)) {
+  const std::vector<KeyframePair> links = EssentialLinks(map, node_of, options.min_shared_landmarks);
+  const std::vector<Matrix7> covariances = LinkCovariances(map, part, links);
+  for (size_t i = 0; i < links.size(); ++i) {
+    const auto [older, newer] = links[i];
     problem.edges.push_back({node_of[newer], node_of[older], PoseOf(map, older).Inverse() * PoseOf(map, newer), 1.0,
-                             MedianDepth(map, *map.FindKeyframe(newer))});
+                             MedianDepth(map, *map.FindKeyframe(newer)), covariances[i]});
   }
   problem.edges.push_back({node_of[current], node_of[place.matched], place.matched_from_current, options.loop_weight,
                            MedianDepth(map, *map.FindKeyframe(current))});

@@ -1,6 +1,7 @@
 // Pose graph optimization: distributes the error of loops over keyframes by their relative poses, without landmarks.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,9 @@ struct PoseGraphEdge {
   // The unit of translation errors, in units of `from`: the median depth of the landmarks that `from` observes or,
   // without landmarks, the distance of the two keyframes. It makes the result independent of the map's unit.
   double length = 1.0;
+  // Of the error, on top of what PoseGraphOptions says of every edge: tangent (translation, rotation [rad], logarithm
+  // of scale) in the axes and units of `from`.
+  Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
 };
 
 struct PoseGraphProblem {
@@ -40,10 +44,11 @@ struct PoseGraphProblem {
 struct PoseGraphOptions {
   int max_num_iterations = 20;       // Levenberg-Marquardt steps; a loop of 3000 keyframes takes 5 to 10
   double function_tolerance = 1e-5;  // ends when a step lowers the cost by less than this part of it
-  // Standard deviations of odometry errors between two keyframes; only their ratios matter (README.md).
-  double translation_sigma = 0.01;  // in units of PoseGraphEdge::length
-  double rotation_sigma_rad = 0.001;
-  double log_scale_sigma = 0.01;
+  // Standard deviations of the error of every edge, by what its covariance doesn't know of. Where edges have none, only
+  // the ratios matter (README.md).
+  double translation_sigma = 0.001;  // in units of PoseGraphEdge::length
+  double rotation_sigma_rad = 0.0001;
+  double log_scale_sigma = 0.001;
 
   // Fails if a value is out of range.
   Result<> Check() const;

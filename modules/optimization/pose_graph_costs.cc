@@ -1,5 +1,6 @@
 #include "optimization/pose_graph_costs.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 
@@ -30,10 +31,16 @@ PoseGraphCost<kSize>::PoseGraphCost(const PoseGraphEdge& edge, const PoseGraphOp
       measured_rotation_(from_from_to_.rotation.toRotationMatrix()),
       from_(from),
       to_(to) {
-  const double factor = std::sqrt(edge.weight);
-  whitening_.template head<3>().setConstant(factor / (edge.length * options.translation_sigma));
-  whitening_.template segment<3>(3).setConstant(factor / options.rotation_sigma_rad);
-  if constexpr (kSize == 7) whitening_(6) = factor / options.log_scale_sigma;
+  Eigen::Matrix<double, 7, 1> sigma;
+  sigma.head<3>().setConstant(edge.length * options.translation_sigma);
+  sigma.segment<3>(3).setConstant(options.rotation_sigma_rad);
+  sigma(6) = options.log_scale_sigma;
+  Eigen::Matrix<double, 7, 7> covariance = edge.covariance;
+  covariance.diagonal() += sigma.cwiseAbs2();
+  // With covariance = L L':  |L^-1 r|^2 = r' covariance^-1 r
+  const Eigen::LLT<Eigen::Matrix<double, kSize, kSize>> cholesky(covariance.topLeftCorner<kSize, kSize>());
+  whitening_ = std::sqrt(edge.weight) * Eigen::Matrix<double, kSize, kSize>::Identity();
+  cholesky.matrixL().solveInPlace(whitening_);
 }
 
 template <int kSize>
@@ -45,7 +52,7 @@ bool PoseGraphCost<kSize>::Evaluate(double const* const* /*parameters*/, double*
   const Sim3 error = from_from_to_ * (to.Inverse() * from);
   const Eigen::Matrix<double, 7, 1> tangent = TangentOf(error);
   Eigen::Map<Eigen::Matrix<double, kSize, 1>> residual(residuals);
-  residual = whitening_.cwiseProduct(tangent.head<kSize>());
+  residual.noalias() = whitening_ * tangent.head<kSize>();
   if (jacobians == nullptr) return true;
 
   // With left perturbations a of rotations, R' = Exp(a) R, and Log(R_E Exp(b)) = Log(R_E) + J_r^-1 b:
@@ -68,11 +75,11 @@ bool PoseGraphCost<kSize>::Evaluate(double const* const* /*parameters*/, double*
   using RowMajor = Eigen::Matrix<double, kSize, kSize, Eigen::RowMajor>;
   if (jacobians[0] != nullptr) {
     Eigen::Map<RowMajor> block(jacobians[0]);
-    block = whitening_.asDiagonal() * by_from;
+    block.noalias() = whitening_ * by_from;
   }
   if (jacobians[1] != nullptr) {
     Eigen::Map<RowMajor> block(jacobians[1]);
-    block = whitening_.asDiagonal() * by_to;
+    block.noalias() = whitening_ * by_to;
   }
   return true;
 }

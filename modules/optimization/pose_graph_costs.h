@@ -55,7 +55,7 @@ class PoseGraphCost final : public ceres::SizedCostFunction<kSize, kSize, kSize>
  private:
   const Sim3 from_from_to_;                  // measured
   const Eigen::Matrix3d measured_rotation_;  // of from_from_to_
-  Eigen::Matrix<double, kSize, 1> whitening_;
+  Eigen::Matrix<double, kSize, kSize> whitening_;
   const MovingNode& from_;
   const MovingNode& to_;
 };
