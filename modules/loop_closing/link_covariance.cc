@@ -76,8 +76,12 @@ std::vector<Matrix7> LinkInformation(const Map& map, std::span<const KeyframePai
 }
 
 Matrix7 BoundedInverse(Matrix7 information, double length, bool has_scale) {
-  if (!has_scale) information.row(6).setZero(), information.col(6).setZero();
-  const double translation = kLinkBounds.translation * length;
+  const double translation = kLinkBounds.depths * length;
+  information /= kInflation;
+  if (!has_scale) {
+    information.row(6).setZero();
+    information.col(6).setZero();
+  }
   information.diagonal().head<3>().array() += 1.0 / (translation * translation);
   information.diagonal().segment<3>(3).array() += 1.0 / (kLinkBounds.rotation_rad * kLinkBounds.rotation_rad);
   information(6, 6) += 1.0 / (kLinkBounds.log_scale * kLinkBounds.log_scale);
@@ -120,8 +124,8 @@ double CommonChange(const std::vector<Step>& steps, size_t i) {
   for (size_t k = i + 1; k-- > 1 && steps[i].end_s - steps[k].end_s < kSlipWindow_s; ++num_before) {
     before += Eigen::Vector2d(steps[k].log_speed, steps[k].log_depth);
   }
-  for (size_t k = i + 1; k < steps.size() && steps[k].end_s - steps[i].end_s <= kSlipWindow_s; ++num_after) {
-    after += Eigen::Vector2d(steps[k].log_speed, steps[k].log_depth), ++k;
+  for (size_t k = i + 1; k < steps.size() && steps[k].end_s - steps[i].end_s <= kSlipWindow_s; ++k, ++num_after) {
+    after += Eigen::Vector2d(steps[k].log_speed, steps[k].log_depth);
   }
   if (num_before == 0 || num_after == 0) return 0.0;
   const Eigen::Vector2d change = after / num_after - before / num_before;

@@ -20,14 +20,19 @@ struct CorrectionOptions {
   Result<> Check() const;
 };
 
-// The essential graph of one part of the map: the spanning tree, pairs that share many landmarks, the
-// loops closed before, and the new one. Edges measure the present relative poses, but the new loop the verified one.
-// The root is fixed. R. Mur-Artal, J. M. M. Montiel, J. D. Tardos, "ORB-SLAM", T-RO 2015.
+// The essential graph of the part of the map that holds both keyframes: the spanning tree, pairs that share many
+// landmarks, the loops closed before, and the new one. Edges measure the present relative poses, with the covariance of
+// their link (link_covariance.h), but the new loop the verified one. The root is fixed. R. Mur-Artal, J. M. M. Montiel,
+// J. D. Tardos, "ORB-SLAM", T-RO 2015.
+//
+// If the two belong to different parts, the graph holds both: that which began later starts as the loop places it, as a
+// whole, and where one ends and the other continues, an edge says how the camera must have moved in between
+// (gap_motion.h).
 PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const VerifiedPlace& place,
                                      const CorrectionOptions& options);
 
-// Corrections by keyframe id. If both keyframes belong to one part of the map, they follow from the optimized essential
-// graph; if they don't, the part that began later moves to the other as a whole. Empty: no solution.
+// Corrections by keyframe id, of every keyframe of the optimized essential graph. Without a link across a gap, the part
+// that began later moves as a whole, and the other stays. Empty: no solution.
 std::vector<LoopResult::Correction> ComputeCorrections(const Map& map, KeyframeId current, const VerifiedPlace& place,
                                                        const CorrectionOptions& options);
 

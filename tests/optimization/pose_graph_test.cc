@@ -191,6 +191,48 @@ TEST(OptimizePoseGraph, MalformedProblemsThrowWithASentence) {
   EXPECT_THROW(OptimizePoseGraph(circuit.problem, {.rotation_sigma_rad = 0.0}), std::invalid_argument);
 }
 
+// A circuit that slipped at one link: what comes after it is three times too large.
+SyntheticCircuit MakeSlippedCircuit(size_t slip, double factor) {
+  SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = 80,
+                                                   .num_neighbors = 1,
+                                                   .translation_sigma = 0.0,
+                                                   .rotation_sigma_rad = 0.0,
+                                                   .log_scale_sigma = 0.0,
+                                                   .log_scale_drift = 0.0});
+  std::vector<PoseGraphNode>& nodes = circuit.problem.nodes;
+  const Eigen::Vector3d pivot = nodes[slip].world_from_keyframe.translation;
+  for (size_t i = slip; i < nodes.size(); ++i) {
+    Eigen::Vector3d& translation = nodes[i].world_from_keyframe.translation;
+    translation = pivot + factor * (translation - pivot);
+    circuit.world_from_keyframe[i].scale = 1.0 / factor;
+  }
+  for (PoseGraphEdge& edge : circuit.problem.edges) {
+    const auto from = static_cast<size_t>(edge.from), to = static_cast<size_t>(edge.to);
+    const bool is_loop = &edge == &circuit.problem.edges.back();
+    const std::vector<Sim3> poses = is_loop ? circuit.world_from_keyframe : PosesOf(circuit.problem);
+    edge.to_from_from = poses[to].Inverse() * poses[from];
+  }
+  return circuit;
+}
+
+TEST(OptimizePoseGraph, AWeakLinkTakesTheCorrectionAndEqualLinksShareIt) {
+  constexpr size_t kSlip = 30;
+  SyntheticCircuit circuit = MakeSlippedCircuit(kSlip, 3.0);
+  const double before = CircuitError(circuit, PosesOf(circuit.problem), 1.0);
+  const auto shared = OptimizePoseGraph(circuit.problem, {});
+  ASSERT_TRUE(shared.has_value());
+  for (size_t i = 1; i < shared->size(); ++i) {
+    EXPECT_LT(std::abs(std::log((*shared)[i].scale / (*shared)[i - 1].scale)), 0.1) << "no link takes all of it";
+  }
+  for (PoseGraphEdge& edge : circuit.problem.edges) {
+    if (edge.to == static_cast<int>(kSlip) || edge.from == static_cast<int>(kSlip)) edge.covariance(6, 6) = 1.0;
+  }
+  const auto right = OptimizePoseGraph(circuit.problem, {});
+  ASSERT_TRUE(right.has_value());
+  EXPECT_LT(CircuitError(circuit, *right, 1.0), 0.01 * before);
+  EXPECT_GT(CircuitError(circuit, *shared, 1.0), 10.0 * CircuitError(circuit, *right, 1.0));
+}
+
 template <int kSize>
 void CheckJacobian() {
   using Vector = Eigen::Matrix<double, kSize, 1>;
