@@ -56,8 +56,8 @@ struct PoseGraphOptions {
 
 // Minimizes over the free S = world_from_keyframe, in Ceres (sparse Cholesky),
 //
-//   1/2 sum_edges weight * |r|^2
-//   r = (t / (length translation_sigma), log(R) / rotation_sigma_rad, ln(s) / log_scale_sigma)
+//   1/2 sum_edges weight * r' (covariance + diag(length translation_sigma, rotation_sigma_rad, log_scale_sigma)^2)^-1 r
+//   r = (t, log(R), ln(s))
 //   (s, R, t) = to_from_from^-1 * (S_to^-1 * S_from)                        what is measured^-1 * what is predicted
 //
 // after H. Strasdat, J. M. M. Montiel, A. Davison, "Scale Drift-Aware Large Scale Monocular SLAM", RSS 2010; (t, log R,

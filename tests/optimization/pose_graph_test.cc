@@ -195,10 +195,9 @@ TEST(OptimizePoseGraph, MalformedProblemsThrowWithASentence) {
 SyntheticCircuit MakeSlippedCircuit(size_t slip, double factor) {
   SyntheticCircuit circuit = MakeSyntheticCircuit({.num_keyframes = 80,
                                                    .num_neighbors = 1,
-                                                   .translation_sigma = 0.0,
                                                    .rotation_sigma_rad = 0.0,
-                                                   .log_scale_sigma = 0.0,
-                                                   .log_scale_drift = 0.0});
+                                                   .translation_sigma = 0.0,
+                                                   .log_scale_sigma = 0.0});
   std::vector<PoseGraphNode>& nodes = circuit.problem.nodes;
   const Eigen::Vector3d pivot = nodes[slip].world_from_keyframe.translation;
   for (size_t i = slip; i < nodes.size(); ++i) {
@@ -225,12 +224,12 @@ TEST(OptimizePoseGraph, AWeakLinkTakesTheCorrectionAndEqualLinksShareIt) {
     EXPECT_LT(std::abs(std::log((*shared)[i].scale / (*shared)[i - 1].scale)), 0.1) << "no link takes all of it";
   }
   for (PoseGraphEdge& edge : circuit.problem.edges) {
-    if (edge.to == static_cast<int>(kSlip) || edge.from == static_cast<int>(kSlip)) edge.covariance(6, 6) = 1.0;
+    if (edge.to == static_cast<int>(kSlip)) edge.covariance(6, 6) = 1.0;
   }
   const auto right = OptimizePoseGraph(circuit.problem, {});
   ASSERT_TRUE(right.has_value());
-  EXPECT_LT(CircuitError(circuit, *right, 1.0), 0.01 * before);
-  EXPECT_GT(CircuitError(circuit, *shared, 1.0), 10.0 * CircuitError(circuit, *right, 1.0));
+  EXPECT_LT(CircuitError(circuit, *right, 1.0), 0.05 * before);
+  EXPECT_GT(CircuitError(circuit, *shared, 1.0), 5.0 * CircuitError(circuit, *right, 1.0));
 }
 
 template <int kSize>
