@@ -31,8 +31,9 @@ std::optional<GapMotion> MotionAcrossGap(const Keyframe& earlier, const Keyframe
   const double speed_before = first.way.norm(), speed_after = second.way.norm();
   if (!(speed_before > 0.0 && speed_after > 0.0)) return std::nullopt;
   const Eigen::Vector3d turn_rad = 0.5 * gap_s * (first.turn_rad + second.turn_rad);
+  const bool has_scale = before.features->calibration.sensor == SensorType::kMono;
   GapMotion motion;
-  motion.before_from_after = {speed_before / speed_after, ExpSO3(turn_rad),
+  motion.before_from_after = {has_scale ? speed_before / speed_after : 1.0, ExpSO3(turn_rad),
                               gap_s * (ExpSO3(0.5 * turn_rad) * first.way)};
   const double way_sigma = kSpeedChange * gap_s * speed_after, turn_sigma = kTurnChange_rad_s * gap_s;
   motion.covariance.diagonal().head<3>().setConstant(way_sigma * way_sigma);

@@ -15,9 +15,9 @@ struct GapMotion {
 };
 
 // Between the last two keyframes before the gap and the first two after it; each two belong to one part of the map, in
-// units of its own. The camera kept its speed, which gives the ratio of the units, and turned at the mean of both
-// rates, but for kSpeedChange and kTurnChange. nullopt: the gap or a step lasts longer than kMaxGap_s, or the camera
-// stood still on one side of it.
+// units of its own. The camera kept its speed, which gives the ratio of the units (mono), and turned at the mean of
+// both rates, but for kSpeedChange and kTurnChange. nullopt: the gap or a step lasts longer than kMaxGap_s, or the
+// camera stood still on one side of it.
 std::optional<GapMotion> MotionAcrossGap(const Keyframe& earlier, const Keyframe& before, const Keyframe& after,
                                          const Keyframe& later);
 inline constexpr double kMaxGap_s = 10.0;
