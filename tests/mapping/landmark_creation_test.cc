@@ -89,9 +89,9 @@ TEST(CreateFromPairs, TwoViewsOfAFreePointBecomeALandmarkWhereThePointIs) {
 // distribution of the inverse depth above zero.
 TEST(CreateFromPairs, APointWithoutParallaxStandsInItsDirection) {
   PartlyKnownMap known(SensorType::kMono, {0, 3}), far(SensorType::kMono, {0, 3});
-  const size_t num_all = known.Run(CreateFromPairs, {.min_parallax_per_turn = 0.0}).size();
+  const size_t num_all = known.Run(CreateFromPairs, {.matching = {.min_parallax_per_turn = 0.0}}).size();
   const std::vector<LandmarkId> created =
-      far.Run(CreateFromPairs, {.min_parallax_sigmas = 1000.0, .min_parallax_per_turn = 0.0});
+      far.Run(CreateFromPairs, {.matching = {.min_parallax_sigmas = 1000.0, .min_parallax_per_turn = 0.0}});
   EXPECT_EQ(created.size(), num_all);
   for (const LandmarkId id : created) {
     const double sigmas = far.Parallax(id) / far.ParallaxSigma(id);
@@ -105,7 +105,8 @@ TEST(CreateFromPairs, APointWithoutParallaxStandsInItsDirection) {
 TEST(CreateFromPairs, OnlyParallaxThatStandsOutOfTheNoiseIsTakenAtItsWord) {
   PartlyKnownMap world(SensorType::kMono, {0, 3});
   int num_known = 0;
-  for (const LandmarkId id : world.Run(CreateFromPairs, {.min_parallax_sigmas = 12.0, .min_parallax_per_turn = 0.0})) {
+  for (const LandmarkId id :
+       world.Run(CreateFromPairs, {.matching = {.min_parallax_sigmas = 12.0, .min_parallax_per_turn = 0.0}})) {
     const double error = (world.Position(id) - world.Truth(id)).norm();
     if (world.Parallax(id) > 12.0 * world.ParallaxSigma(id)) {
       EXPECT_LT(error, 0.02);
@@ -120,7 +121,7 @@ TEST(CreateFromPairs, ATurnBetweenTheViewsCountsAsNoise) {
   PartlyKnownMap world(SensorType::kMono, {0, 3});
   const double limit = 3.0 * world.Turn();
   int num_known = 0, num_nearer = 0;
-  for (const LandmarkId id : world.Run(CreateFromPairs, {.min_parallax_per_turn = 3.0})) {
+  for (const LandmarkId id : world.Run(CreateFromPairs, {.matching = {.min_parallax_per_turn = 3.0}})) {
     const double share = (world.Position(id) - world.Center()).norm() / (world.Truth(id) - world.Center()).norm();
     if (world.Parallax(id) >= limit) {
       EXPECT_NEAR(share, 1.0, 0.01);
@@ -149,7 +150,7 @@ TEST(CreateFromPairs, OnlyTheBestNeighborsAreSearched) {
 // Descriptors of one point differ by about 20 bits in this world.
 TEST(CreateFromPairs, DescriptorsMustBeAlike) {
   PartlyKnownMap world(SensorType::kMono, {0, 3});
-  EXPECT_TRUE(world.Run(CreateFromPairs, {.max_hamming = 1}).empty());
+  EXPECT_TRUE(world.Run(CreateFromPairs, {.matching = {.max_hamming = 1}}).empty());
 }
 
 TEST(CreateFromDepth, AKeypointWithDepthBecomesALandmarkWhereThePointIs) {
@@ -186,10 +187,10 @@ TEST(CreateFromDepth, MonoKeypointsHaveNone) {
 TEST(CreationOptions, OutOfRangeIsRefused) {
   EXPECT_THAT(CreationOptions{}.Check(), IsSuccess());
   EXPECT_THAT(CreationOptions{.max_neighbors = 0}.Check(), IsFailure(HasSubstr("neighbor")));
-  EXPECT_THAT(CreationOptions{.min_parallax_sigmas = 0.0}.Check(), IsFailure(HasSubstr("parallax")));
-  EXPECT_THAT(CreationOptions{.min_parallax_per_turn = -0.1}.Check(), IsFailure(HasSubstr("parallax")));
-  EXPECT_THAT(CreationOptions{.min_parallax_per_turn = 0.0}.Check(), IsSuccess());
-  EXPECT_THAT(CreationOptions{.max_hamming = 257}.Check(), IsFailure(HasSubstr("256")));
+  EXPECT_THAT(CreationOptions{.matching = {.min_parallax_sigmas = 0.0}}.Check(), IsFailure(HasSubstr("parallax")));
+  EXPECT_THAT(CreationOptions{.matching = {.min_parallax_per_turn = -0.1}}.Check(), IsFailure(HasSubstr("parallax")));
+  EXPECT_THAT(CreationOptions{.matching = {.min_parallax_per_turn = 0.0}}.Check(), IsSuccess());
+  EXPECT_THAT(CreationOptions{.matching = {.max_hamming = 257}}.Check(), IsFailure(HasSubstr("256")));
 }
 
 }  // namespace

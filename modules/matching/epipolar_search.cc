@@ -1,0 +1,178 @@
+#include "matching/epipolar_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "geometry/triangulation.h"
+#include "measurement/landmark_view.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kMinLever = 1e-8;       // squared sine of the angle between a ray and the way from view to view
+constexpr double kMinPointDepth = 1e-3;  // of a point, in units of the map: nearer ones are false matches
+
+// By how much the camera turned, rad.
+double AngleOf(const Rigid3& second_from_first) {
+  return 2.0 * std::acos(std::min(1.0, std::abs(second_from_first.rotation.w())));
+}
+
+}  // namespace
+
+Result<> EpipolarOptions::Check() const {
+  if (!(min_parallax_sigmas > 0.0) || !(min_parallax_per_turn >= 0.0))
+    return Failed("the least parallax of new points must be positive");
+  if (max_hamming < 1 || max_hamming > 256)
+    return Failed("the Hamming distance of new points must be between 1 and 256");
+  return {};
+}
+
+EpipolarSearch::EpipolarSearch(const FeatureFrame& first, const FeatureFrame& second, const Rigid3& second_from_first,
+                               std::function<bool(int32_t)> is_free, double min_depth, const EpipolarOptions& options)
+    : options_(options),
+      first_(first),
+      second_(second),
+      calibration_(first_.calibration),
+      baseline_m_(Baseline(calibration_)),
+      second_from_first_(second_from_first),
+      rotation_(second_from_first_.rotation.toRotationMatrix()),
+      roll_(RollBetween(second_from_first_)),
+      max_inverse_depth_(1.0 / min_depth),
+      min_parallax_of_turn_(options.min_parallax_per_turn * AngleOf(second_from_first_)),
+      is_free_(std::move(is_free)) {
+  for (int level = 0; level < kMaxLevels; ++level) {
+    limits_px_[static_cast<size_t>(level)] = std::sqrt(kChi2LimitOfOne) * LevelScale(level);
+  }
+  std::vector<Keypoint> keypoints;
+  for (int32_t i = 0; i < static_cast<int32_t>(second_.keypoints.size()); ++i) {
+    if (!is_free_(i)) continue;
+    keypoints.push_back(second_.keypoints[Index(i)]);
+    free_.push_back(i);
+  }
+  grid_ = FeatureGrid(keypoints, calibration_.width_px, calibration_.height_px);
+}
+
+// A disparity d +- 3 sigma stands for inverse depths (d +- 3 sigma) / (fx baseline).
+EpipolarSearch::InverseDepths EpipolarSearch::Bounds(const PixelObservation& seen) const {
+  if (!seen.has_right()) return {0.0, max_inverse_depth_};
+  const double per_px = 1.0 / (calibration_.fx_px * baseline_m_);
+  const double disparity_px = seen.pixel_px.x() - seen.right_x_px;
+  return {std::max(0.0, (disparity_px - 3.0 * seen.sigma_px) * per_px), (disparity_px + 3.0 * seen.sigma_px) * per_px};
+}
+
+std::optional<EpipolarSearch::Match> EpipolarSearch::Find(int32_t keypoint) const {
+  const PixelObservation seen = SeenAt(first_, keypoint);
+  const std::optional<int32_t> other = BestOnLine(keypoint, seen, calibration_.Ray(seen.pixel_px));
+  if (!other) return std::nullopt;
+  const PixelObservation seen_in_second = SeenAt(second_, *other);
+  const std::optional<Eigen::Vector3d> point = Triangulate(seen, seen_in_second);
+  if (!point || !IsConsistent(*point, seen, seen_in_second)) return std::nullopt;
+  return Match{*other, *point};
+}
+
+// A point at inverse depth w along the ray stands, up to scale, at R ray + w t in the second camera.
+std::optional<int32_t> EpipolarSearch::BestOnLine(int32_t keypoint, const PixelObservation& seen,
+                                                  const Eigen::Vector3d& ray) const {
+  const InverseDepths bounds = Bounds(seen);
+  const Eigen::Vector3d direction = rotation_ * ray;
+  const Eigen::Vector3d far = direction + bounds.low * second_from_first_.translation;
+  Eigen::Vector3d near = direction + bounds.high * second_from_first_.translation;
+  if (far.z() < 0.05) return std::nullopt;  // leaves at the side or the back
+  if (near.z() < 0.05) {                    // cut where the ray passes the camera
+    near = far + (near - far) * ((far.z() - 0.05) / (far.z() - near.z()));
+  }
+  const Eigen::Vector2d a = calibration_.Project(far), b = calibration_.Project(near);
+  const Eigen::Vector2d along = b - a;
+  const double length = along.norm();
+  const Eigen::Vector2d unit = length > 1e-9 ? Eigen::Vector2d(along / length) : Eigen::Vector2d::UnitX();
+
+  const Keypoint& from = first_.keypoints[Index(keypoint)];
+  const Descriptor& descriptor = first_.descriptors[Index(keypoint)];
+  int best_distance = options_.max_hamming + 1, second_distance = 257;
+  int32_t best = -1;
+  Eigen::Vector2d best_px = Eigen::Vector2d::Zero();
+  const double margin_px = limits_px_[static_cast<size_t>(std::min(kTopLevel, from.level + 2))];
+  grid_.VisitSegment(a, b, margin_px, [&](int32_t number) {
+    const int32_t candidate = free_[Index(number)];
+    const Keypoint& to = second_.keypoints[Index(candidate)];
+    if (!is_free_(candidate) || std::abs(int{to.level} - int{from.level}) > 2) return;
+    const Eigen::Vector2d offset = Eigen::Vector2d(to.x_px, to.y_px) - a;
+    const double limit = limits_px_[std::min<size_t>(to.level, kMaxLevels - 1)];
+    const double along_px = unit.dot(offset), aside_px = unit.x() * offset.y() - unit.y() * offset.x();
+    if (std::abs(aside_px) > limit || along_px < -limit || along_px > length + limit) return;
+    if (!AreAnglesNear(from.angle, to.angle, roll_)) return;
+    const int distance = HammingDistance(descriptor, second_.descriptors[Index(candidate)]);
+    const Eigen::Vector2d to_px(to.x_px, to.y_px);
+    // The same corner found on another level is not a second candidate.
+    const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
+    if (distance < best_distance) {
+      if (is_elsewhere && best >= 0) second_distance = best_distance;
+      best_distance = distance;
+      best = candidate;
+      best_px = to_px;
+    } else if (is_elsewhere && distance < second_distance) {
+      second_distance = distance;
+    }
+  });
+  if (best < 0 || best_distance > options_.max_hamming_ratio * second_distance) return std::nullopt;
+  return best;
+}
+
+// From the two rays where they have parallax, from the disparity of one of them where that has more.
+std::optional<Eigen::Vector3d> EpipolarSearch::Triangulate(const PixelObservation& in_first,
+                                                           const PixelObservation& in_second) const {
+  const Eigen::Vector3d ray = calibration_.Ray(in_first.pixel_px);
+  const Eigen::Vector3d ray_in_second = calibration_.Ray(in_second.pixel_px);
+  const Eigen::Vector3d turned = rotation_ * ray;
+  const double parallax = std::acos(std::min(1.0, turned.normalized().dot(ray_in_second.normalized())));
+  const auto stereo_parallax = [&](const PixelObservation& seen) {
+    return seen.has_right() ? (seen.pixel_px.x() - seen.right_x_px) / calibration_.fx_px : 0.0;
+  };
+  const double by_first = stereo_parallax(in_first), by_second = stereo_parallax(in_second);
+  const double noise_rad = std::hypot(in_first.sigma_px, in_second.sigma_px) / calibration_.fx_px;
+  const double min_parallax = options_.min_parallax_sigmas * noise_rad;
+  if (parallax >= std::max({min_parallax, min_parallax_of_turn_, by_first, by_second})) {
+    return TriangulateRays(second_from_first_, ray, ray_in_second);
+  }
+  if (!in_first.has_right() && !in_second.has_right()) {
+    return FarPoint(ray, ray_in_second, std::hypot(noise_rad, min_parallax_of_turn_ / options_.min_parallax_sigmas));
+  }
+  if (std::max(by_first, by_second) < min_parallax) return std::nullopt;
+  if (by_first >= by_second) return PointFromDisparity(calibration_, baseline_m_, in_first);
+  const auto point = PointFromDisparity(calibration_, baseline_m_, in_second);
+  return point ? std::optional<Eigen::Vector3d>(second_from_first_.Inverse() * *point) : std::nullopt;
+}
+
+// Two rays that are parallel up to noise, or diverge. The point at inverse depth w along the first one stands, up to
+// scale, at a + w t in the second camera, a = R ray. With the second ray b of length 1 it is nearest to that for
+//
+//   w = -(b x a) . (b x t) / |b x t|^2,    sigma_w = noise |ray| / |b x t|
+//
+// and w may come out negative. What is left of its distribution above zero has its mean at about
+// (w + sqrt(w^2 + 2 sigma_w^2)) / 2.
+std::optional<Eigen::Vector3d> EpipolarSearch::FarPoint(const Eigen::Vector3d& ray,
+                                                        const Eigen::Vector3d& ray_in_second, double noise_rad) const {
+  const Eigen::Vector3d b = ray_in_second.normalized();
+  const Eigen::Vector3d aside = b.cross(rotation_ * ray), by_depth = b.cross(second_from_first_.translation);
+  const double squared = by_depth.squaredNorm();
+  if (squared < kMinLever * second_from_first_.translation.squaredNorm()) return std::nullopt;
+  const double w = -aside.dot(by_depth) / squared, sigma = noise_rad * ray.norm() / std::sqrt(squared);
+  return Eigen::Vector3d(2.0 / (w + std::sqrt(w * w + 2.0 * sigma * sigma)) * ray);
+}
+
+bool EpipolarSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const PixelObservation& in_first,
+                                  const PixelObservation& in_second) const {
+  const Eigen::Vector3d point_in_second = second_from_first_ * point_in_first;
+  if (point_in_first.z() < kMinPointDepth || point_in_second.z() < kMinPointDepth) return false;
+  for (const auto& [point, seen] : {std::pair(point_in_first, in_first), std::pair(point_in_second, in_second)}) {
+    const Eigen::Vector3d residual = ReprojectionResidual(calibration_, baseline_m_, point, seen);
+    if (residual.squaredNorm() > Chi2Limit(seen.has_right())) return false;
+  }
+  // A patch twice as far away looks half as large: distance / sigma must be alike, up to one and a half levels' ratio.
+  const double ratio = point_in_second.norm() / in_second.sigma_px / (point_in_first.norm() / in_first.sigma_px);
+  const double max_ratio = 1.5 * LevelScale(1);
+  return ratio < max_ratio && ratio * max_ratio > 1.0;
+}
+
+}  // namespace tessera

@@ -1,0 +1,83 @@
+// The search along epipolar lines for second views of keypoints, between two views whose relative pose is known.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/result.h"
+#include "features/feature_types.h"
+#include "geometry/reprojection.h"
+#include "geometry/rigid3.h"
+#include "measurement/feature_grid.h"
+#include "measurement/keypoint_measurement.h"
+
+namespace tessera {
+
+struct EpipolarOptions {
+  // Two views show the depth of a point if their rays' parallax is this many standard deviations. A point without
+  // parallax is created too, far away: it holds the rotation, and how little is known of its depth stands in
+  // Landmark::depth_sigma. If only points were created whose noise makes parallax, noise would become depth, and a bend
+  // that the map has by mistake would be confirmed by all new points.
+  double min_parallax_sigmas = 3.0;
+  // And at least this share of the angle by which the camera turned between the views. Noise averages out over hundreds
+  // of landmarks. What is systematic in the images (the rest of a lens distortion, a rolling shutter) does not, and
+  // grows with the way that a keypoint makes through the image: an error of 1 % of the turn is one of 5 % of the depth.
+  double min_parallax_per_turn = 0.2;
+  int max_hamming = 50;             // bits of 256: what patches of one point differ by, nearly always
+  double max_hamming_ratio = 0.85;  // best match to the second best along the line, elsewhere on it
+
+  // Fails if a value is out of range.
+  Result<> Check() const;
+};
+
+// Looks near a keypoint's epipolar line, on the segment for depths from `min_depth` to infinity. A pair must agree in
+// descriptor, orientation and level, and its point must lie in front of both cameras, project to both keypoints
+// (chi-square), and have distances that fit the levels.
+class EpipolarSearch {
+ public:
+  // The features must outlive the search. `is_free` says which keypoints of the second view take part; one that a
+  // match has taken may stop being free.
+  EpipolarSearch(const FeatureFrame& first, const FeatureFrame& second, const Rigid3& second_from_first,
+                 std::function<bool(int32_t)> is_free, double min_depth, const EpipolarOptions& options);
+
+  // The keypoint of the second view that sees the same point, and the point in the first camera's frame.
+  struct Match {
+    int32_t keypoint;
+    Eigen::Vector3d point_in_first;
+  };
+  std::optional<Match> Find(int32_t keypoint) const;
+
+ private:
+  struct InverseDepths {
+    double low;
+    double high;
+  };
+  InverseDepths Bounds(const PixelObservation& seen) const;
+  std::optional<int32_t> BestOnLine(int32_t keypoint, const PixelObservation& seen, const Eigen::Vector3d& ray) const;
+  std::optional<Eigen::Vector3d> Triangulate(const PixelObservation& in_first, const PixelObservation& in_second) const;
+  std::optional<Eigen::Vector3d> FarPoint(const Eigen::Vector3d& ray, const Eigen::Vector3d& ray_in_second,
+                                          double noise_rad) const;
+  bool IsConsistent(const Eigen::Vector3d& point_in_first, const PixelObservation& in_first,
+                    const PixelObservation& in_second) const;
+
+  const EpipolarOptions options_;
+  const FeatureFrame& first_;
+  const FeatureFrame& second_;
+  const CameraCalibration& calibration_;
+  const double baseline_m_;
+  const Rigid3 second_from_first_;
+  const Eigen::Matrix3d rotation_;
+  const uint8_t roll_;
+  const double max_inverse_depth_;
+  const double min_parallax_of_turn_;         // rad
+  std::array<double, kMaxLevels> limits_px_;  // by level: how far from the line a keypoint may lie
+  const std::function<bool(int32_t)> is_free_;
+  std::vector<int32_t> free_;  // keypoints of the second view that were free at first
+  FeatureGrid grid_;           // of these, by their number in free_
+};
+
+}  // namespace tessera

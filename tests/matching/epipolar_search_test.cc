@@ -1,0 +1,59 @@
+// Second views along epipolar lines on the synthetic world, where it is known which keypoint shows which point.
+#include "matching/epipolar_search.h"
+
+#include <gtest/gtest.h>
+
+#include "support/matchers.h"
+#include "support/synthetic_world.h"
+
+namespace tessera {
+namespace {
+
+bool AnyKeypoint(int32_t) { return true; }
+
+class EpipolarPairs : public testing::Test {
+ protected:
+  SyntheticWorld world_{SensorType::kMono, 0.3};
+  const SyntheticWorld::Picture first_ = world_.Take(0), second_ = world_.Take(2);
+  const Rigid3 second_from_first_ = SyntheticWorld::Pose(2).Inverse() * SyntheticWorld::Pose(0);
+  const EpipolarOptions options_{.min_parallax_per_turn = 0.0};
+};
+
+TEST_F(EpipolarPairs, AreOfTheSamePointAndShowWhereItIs) {
+  const EpipolarSearch search(first_.features, second_.features, second_from_first_, AnyKeypoint, 1.0, options_);
+  int num = 0, num_true = 0, num_near = 0;
+  for (size_t i = 0; i < first_.points.size(); ++i) {
+    const auto match = search.Find(static_cast<int32_t>(i));
+    if (!match) continue;
+    ++num;
+    if (second_.points[static_cast<size_t>(match->keypoint)] != first_.points[i]) continue;
+    ++num_true;
+    const Eigen::Vector3d truth = SyntheticWorld::Pose(0).Inverse() * world_.point(first_.points[i]);
+    num_near += (match->point_in_first - truth).norm() < 0.3 * truth.norm() ? 1 : 0;
+  }
+  EXPECT_GT(num, 200);
+  EXPECT_GT(num_true, 0.97 * num);
+  EXPECT_GT(num_near, 0.8 * num_true);
+}
+
+TEST_F(EpipolarPairs, TakeFreeKeypointsOnly) {
+  const auto is_even = [](int32_t keypoint) { return keypoint % 2 == 0; };
+  const EpipolarSearch search(first_.features, second_.features, second_from_first_, is_even, 1.0, options_);
+  int num = 0;
+  for (int32_t i = 0; i < static_cast<int32_t>(first_.points.size()); ++i) {
+    const auto match = search.Find(i);
+    if (!match) continue;
+    ++num;
+    EXPECT_EQ(match->keypoint % 2, 0);
+  }
+  EXPECT_GT(num, 100);
+}
+
+TEST(EpipolarOptions, OutOfRangeIsRefused) {
+  EXPECT_THAT(EpipolarOptions{}.Check(), IsSuccess());
+  EXPECT_THAT(EpipolarOptions{.min_parallax_sigmas = 0.0}.Check(), IsFailure(HasSubstr("parallax")));
+  EXPECT_THAT(EpipolarOptions{.max_hamming = 0}.Check(), IsFailure(HasSubstr("256")));
+}
+
+}  // namespace
+}  // namespace tessera
