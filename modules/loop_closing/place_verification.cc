@@ -2,7 +2,6 @@
 
 #include <map>
 #include <memory>
-#include <set>
 
 #include "map/neighborhood.h"
 #include "matching/frame_pose.h"
@@ -84,32 +83,6 @@ int LocalizeAmong(const KnownPoints& points, const MatchOptions& matching, const
   frame.points.assign(frame.points.size(), {});
   MatchLocal(points, matching.local_radius_px, matching, frame);
   return OptimizeFrame(pose, frame);
-}
-
-double Coverage(const KnownPoints& points, const TrackedFrame& frame) {
-  constexpr int kCellsAcross = 16, kMinExpected = 3;
-  const CameraCalibration& camera = frame.view->calibration();
-  const double cell_px = static_cast<double>(camera.width_px) / kCellsAcross;
-  const auto cell_of = [&](const Eigen::Vector2d& pixel_px) {
-    return kCellsAcross * static_cast<int>(pixel_px.y() / cell_px) + static_cast<int>(pixel_px.x() / cell_px);
-  };
-  std::map<int, int> num_expected;
-  const View view(camera, frame.world_from_camera);
-  for (const auto& [id, landmark] : points) {
-    if (const std::optional<ExpectedView> expected = Expect(view, landmark))
-      ++num_expected[cell_of(expected->pixel_px)];
-  }
-  std::set<int> shown;
-  for (size_t i = 0; i < frame.points.size(); ++i) {
-    if (frame.points[i].valid()) shown.insert(cell_of(frame.view->observation(static_cast<int>(i)).pixel_px));
-  }
-  int num_cells = 0, num_shown = 0;
-  for (const auto& [cell, num] : num_expected) {
-    if (num < kMinExpected) continue;
-    ++num_cells;
-    num_shown += shown.contains(cell) ? 1 : 0;
-  }
-  return num_cells > 0 ? static_cast<double>(num_shown) / num_cells : 0.0;
 }
 
 std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& places, KeyframeId current_id,

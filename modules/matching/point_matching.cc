@@ -1,6 +1,8 @@
 #include "matching/point_matching.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 namespace tessera {
 namespace {
@@ -126,6 +128,32 @@ int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, Tracke
     }
   }
   return frame.NumPoints();
+}
+
+double Coverage(const KnownPoints& points, const TrackedFrame& frame) {
+  constexpr int kCellsAcross = 16, kMinExpected = 3;
+  const CameraCalibration& camera = frame.view->calibration();
+  const double cell_px = static_cast<double>(camera.width_px) / kCellsAcross;
+  const auto cell_of = [&](const Eigen::Vector2d& pixel_px) {
+    return kCellsAcross * static_cast<int>(pixel_px.y() / cell_px) + static_cast<int>(pixel_px.x() / cell_px);
+  };
+  std::map<int, int> num_expected;
+  const View view(camera, frame.world_from_camera);
+  for (const auto& [id, landmark] : points) {
+    if (const std::optional<ExpectedView> expected = Expect(view, landmark))
+      ++num_expected[cell_of(expected->pixel_px)];
+  }
+  std::set<int> shown;
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (frame.points[i].valid()) shown.insert(cell_of(frame.view->observation(static_cast<int>(i)).pixel_px));
+  }
+  int num_cells = 0, num_shown = 0;
+  for (const auto& [cell, num] : num_expected) {
+    if (num < kMinExpected) continue;
+    ++num_cells;
+    num_shown += shown.contains(cell) ? 1 : 0;
+  }
+  return num_cells > 0 ? static_cast<double>(num_shown) / num_cells : 0.0;
 }
 
 }  // namespace tessera
