@@ -26,6 +26,7 @@ Result<> KeyframeDecisionOptions::Check() const {
   for (const double share : {min_share, min_first_share, min_still_share}) {
     if (!(share > 0.0 && share < 1.0)) return Failed("the shares of a reference's points must be between 0 and 1");
   }
+  if (!(max_turn_share > 0.0)) return Failed("max_turn_share must be positive");
   if (!(min_parallax_rad > 0.0) || max_interval_us < 1) return Failed("the limits of keyframes must be positive");
   return {};
 }
@@ -67,6 +68,18 @@ double KeyframeDecision::NextShare(double share, int64_t utime_us, int64_t frame
   return share - (1.0 - share) * std::min(1.0, static_cast<double>(frame_interval_us) / elapsed_us);
 }
 
+// The turn since the reference, taken one frame ahead.
+bool KeyframeDecision::TurnsAway(const TrackedFrame& frame, const Rigid3& world_from_reference,
+                                 int64_t frame_interval_us) const {
+  if (frame.view->baseline_m() > 0.0) return false;
+  const CameraCalibration& camera = frame.view->calibration();
+  const double field_of_view_rad = 2.0 * std::atan(0.5 * camera.width_px / camera.fx_px);
+  const double turn_rad = LogSO3(world_from_reference.rotation.conjugate() * frame.world_from_camera.rotation).norm();
+  const auto elapsed_us = static_cast<double>(std::max<int64_t>(1, frame.view->features().utime_us - utime_us_));
+  const double ahead = std::min(1.0, static_cast<double>(frame_interval_us) / elapsed_us);
+  return turn_rad * (1.0 + ahead) > options_.max_turn_share * field_of_view_rad;
+}
+
 bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_us, const Rigid3& world_from_reference,
                               const NearKeypoints& near) {
   Seen seen = See(frame, world_from_reference);
@@ -85,7 +98,8 @@ bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_
   const bool is_old = utime_us - utime_us_ > options_.max_interval_us;
   const bool lacks_points = frame.NumPoints() < options_.min_points;
   const bool has_parallax = frame.view->baseline_m() == 0.0 && seen.median_parallax_rad > options_.min_parallax_rad;
-  return has_lost_sight || lacks_near || (has_moved && (is_old || lacks_points || has_parallax));
+  const bool turns_away = TurnsAway(frame, world_from_reference, frame_interval_us);
+  return has_lost_sight || turns_away || lacks_near || (has_moved && (is_old || lacks_points || has_parallax));
 }
 
 }  // namespace tessera

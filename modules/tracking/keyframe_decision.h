@@ -21,6 +21,9 @@ struct KeyframeDecisionOptions {
   double min_first_share = 0.4;
   double min_parallax_rad =
       0.035;  // mono: 2 degrees of median parallax to the reference: new points can be triangulated well
+  // Mono: and the camera must not turn by more than this share of its field of view: what comes into view at the next
+  // frame is known only if this one and the reference both see it.
+  double max_turn_share = 0.4;
   double min_still_share = 0.9;       // few points, parallax or age is no reason while more than this is still seen
   int min_points = 150;               // a frame that sees fewer known points becomes a keyframe if anything moved
   int64_t max_interval_us = 2000000;  // not longer than this, if anything moved
@@ -55,6 +58,7 @@ class KeyframeDecision {
     double median_parallax_rad = 0.0;
   };
   Seen See(const TrackedFrame& frame, const Rigid3& world_from_reference) const;
+  bool TurnsAway(const TrackedFrame& frame, const Rigid3& world_from_reference, int64_t frame_interval_us) const;
   double NextShare(double share, int64_t utime_us, int64_t frame_interval_us) const;
 
   const KeyframeDecisionOptions options_;

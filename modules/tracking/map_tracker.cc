@@ -9,6 +9,8 @@
 #include "matching/frame_pose.h"
 #include "measurement/landmark_description.h"
 #include "tracking/local_points.h"
+#include "tracking/pair_motion.h"
+#include "tracking/pair_points.h"
 
 namespace tessera {
 namespace {
@@ -16,6 +18,13 @@ namespace {
 // Of the points that agree on a pose by themselves: fewer that agree with the motion of a moment ago contradict it.
 constexpr double kMinShareWithMotion = 0.5;
 constexpr double kDriftInterval_s = 0.1;
+// A try to follow the last frame has found the true pose if these shares of the matches, and of the last frame's
+// points, agree with it. At usual steps 0.77 and 0.44 is the least that was seen (KITTI 03); walls and fences seen one
+// window too far gave up to 0.66 and 0.37.
+constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
+constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
+constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
+constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 
 // A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark. `covariance`: of the
 // point, if its depth isn't known by the view itself.
@@ -75,6 +84,9 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
       if (view->baseline_m() == 0.0) AddScaleDrift(last_->reference_from_camera);
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
     }
+  } else if (before == State::kTracking && FollowPair(view, result.keyframes)) {
+    result.pose.num_matches = last_->frame.NumPoints();
+    result.pose.state = TrackingState::kTracked;
   } else if (may_ask && CanAskFor(*view)) {
     asked_ = view;
     result.asks_relocalization = true;
@@ -201,15 +213,22 @@ void MapTracker::UpdateLast() {
 // The frame becomes the last one if its pose can be found in the map around that one.
 bool MapTracker::Localize(const Frame& view) {
   TrackedFrame frame(view);
-  const bool is_near = (!lost_since_us_ && FollowLast(frame)) || Relocalize(frame);
-  if (!is_near) return false;
-  MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
+  std::optional<StepKind> step;
+  if (!lost_since_us_) step = FollowLast(frame);
+  if (!step) {
+    if (!Relocalize(frame)) return false;
+    step = StepKind::kDoubtful;
+  }
+  const KnownPoints around = PointsAround(frame);
+  MatchLocal(around, options_.matching.local_radius_px, options_.matching, frame);
   const int min_of_last = static_cast<int>(options_.min_share_of_last * last_->frame.NumPoints());
   const int min_inliers =
       lost_since_us_ ? options_.min_relocalized_inliers : std::max(options_.min_inliers, min_of_last);
   const FramePose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < min_inliers) return false;
-  Remember(std::move(frame), pose);
+  // After a loss the greater number of inliers says as much.
+  if (!lost_since_us_ && step == StepKind::kDoubtful && Coverage(around, frame) < kMinCoverage) return false;
+  Remember(std::move(frame), pose, *step);
   return true;
 }
 
@@ -267,20 +286,85 @@ KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
   return LocalPoints(replica_, frame, options_.max_local_keyframes);
 }
 
-bool MapTracker::FollowLast(TrackedFrame& frame) const {
-  const std::optional<MotionPrediction> motion = PredictMotion(*frame.view);
+// In windows around where the motion leads, ever wider; then from where the points around the last frame are found by
+// descriptor alone, and from how the two frames as such show the motion. The first clear try ends it, else the best one
+// counts, if any has enough inliers.
+std::optional<MapTracker::StepKind> MapTracker::FollowLast(TrackedFrame& frame) const {
+  const Frame view = frame.view;
+  const std::optional<MotionPrediction> motion = PredictMotion(*view);
   const Rigid3 last_from_current = motion ? motion->last_from_current : Rigid3::Identity();
   const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
-  const Sim3 world_from_reference = WorldFromReference();
+  const Rigid3 predicted = (WorldFromReference() * reference_from_current).Pose();
   const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
+  FollowTries tries;
+  bool is_clear = false;
   for (const double widening : {1.0, 2.0, 4.0}) {
-    frame.world_from_camera = (world_from_reference * reference_from_current).Pose();
-    const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
-    if (num < options_.min_last_matches) continue;
-    const PoseOptimizationResult optimized = OptimizeFramePose(options_.pose, prior ? &*prior : nullptr, frame);
-    if (optimized.num_inliers >= options_.min_last_matches / 2) return true;
+    is_clear = is_clear || TryAt(predicted, widening, prior ? &*prior : nullptr, view, tries);
   }
-  return false;
+  if (!is_clear) {
+    TrackedFrame placed(view);
+    is_clear = Relocalize(placed) && TryAt(placed.world_from_camera, 1.0, nullptr, view, tries);
+  }
+  if (!is_clear) {
+    const std::optional<Rigid3> by_pair = PoseByPair(*view);
+    is_clear = by_pair && TryAt(*by_pair, 1.0, nullptr, view, tries);
+  }
+  if (tries.num_inliers < options_.min_last_matches / 2) return std::nullopt;
+  frame = std::move(*tries.best);
+  if (!is_clear) return StepKind::kDoubtful;
+  return tries.num_tries == 1 ? StepKind::kUsual : StepKind::kWide;
+}
+
+// Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
+bool MapTracker::TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, const Frame& view,
+                       FollowTries& tries) const {
+  ++tries.num_tries;
+  TrackedFrame frame(view);
+  frame.world_from_camera = world_from_camera;
+  const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
+  if (num < options_.min_last_matches) return false;
+  const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
+  if (num_inliers > tries.num_inliers) {
+    tries.num_inliers = num_inliers;
+    tries.best = std::move(frame);
+  }
+  return num_inliers >= options_.min_last_matches / 2 && num_inliers > kMinShareOfMatches * num &&
+         num_inliers > kMinShareOfLast * last_->frame.NumPoints();
+}
+
+// Mono: where the last frame and this one by themselves show the camera.
+std::optional<Rigid3> MapTracker::PoseByPair(const FrameView& view) const {
+  if (view.baseline_m() > 0.0) return std::nullopt;
+  const std::optional<MotionPrediction> motion = PredictMotion(view);
+  std::optional<Eigen::Vector3d> expected;
+  if (motion) expected = WorldFromReference().scale * motion->last_from_current.translation;
+  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_->frame, view, expected, {});
+  return last_from_current ? std::optional(last_->frame.world_from_camera * *last_from_current) : std::nullopt;
+}
+
+// Where hardly a known point is left in view, the way on is what the last frame and this one show by themselves: both
+// become keyframes, and what they see is new.
+bool MapTracker::FollowPair(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
+  if (!last_ || !options_.makes_keyframes) return false;
+  const std::optional<Rigid3> world_from_camera = PoseByPair(*view);
+  if (!world_from_camera) return false;
+  const double interval_s = SinceLast(*view);
+  if (!reference_frame_ || reference_frame_->view != last_->frame.view) {
+    keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
+  }
+  TrackedFrame frame(view);
+  frame.world_from_camera = *world_from_camera;
+  MatchLast(last_->frame, options_.matching.last_radius_px, options_.matching, frame);
+  OptimizeFrame(options_.pose, frame);  // leaves the points that agree with one another
+  frame.world_from_camera = *world_from_camera;
+  const Rigid3 reference_from_camera = (WorldFromReference().Inverse() * frame.world_from_camera).Pose();
+  const double sigma = kPairSigmaShare * reference_from_camera.translation.norm();
+  const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
+  if (interval_s > 0.0) motion_.Add(reference_from_camera, covariance, interval_s, true);
+  last_.emplace(Last{std::move(frame), reference_from_camera, StepEvidence::kWeak, covariance, StepKind::kDoubtful});
+  AddScaleDrift(reference_from_camera);
+  keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
+  return true;
 }
 
 // Without a predicted pose: the points around the last frame, matched by descriptor alone.
@@ -321,6 +405,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
   if (OptimizeFrame(options_.pose, frame) < options_.min_relocalized_inliers) return false;
   reference_ = answer.reference;
+  reference_frame_.reset();
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
   ResetMotion();
@@ -328,7 +413,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   return true;
 }
 
-void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
+void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, StepKind step) {
   const Sim3 reference_from_world = WorldFromReference().Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
@@ -342,7 +427,7 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose) {
                 pose.evidence == StepEvidence::kWeak);
   }
   lost_since_us_.reset();
-  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance});
+  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, step});
 }
 
 void MapTracker::AddScaleDrift(const Rigid3& reference_from_camera) {
@@ -430,9 +515,11 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   const bool has_known_points = frame.NumPoints() > 0;
   if (has_known_points) decision_.Restart(frame);
   AddDepthPoints(frame, keyframe.id, sent);
+  AddPairPoints(frame, keyframe, sent);
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
+  reference_frame_ = frame;
   ++next_keyframe_.value;
   if (last_) last_->reference_from_camera = Rigid3::Identity();
   return keyframe;
@@ -448,6 +535,26 @@ void MapTracker::AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe
     const Landmark in_camera = PointOf(*frame.view, i, *point);
     sent.points[i] = in_camera;
     frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), in_camera)};
+  }
+}
+
+// Mono, after a wide step: until the mapper answers, what this keyframe and its reference see is known by them. At the
+// next step it may be all that is left in view.
+void MapTracker::AddPairPoints(TrackedFrame& frame, KeyframeObservation& keyframe, SentKeyframe& sent) const {
+  const bool is_wide = last_ && &last_->frame == &frame && last_->step != StepKind::kUsual;
+  if (!is_wide || frame.view->baseline_m() > 0.0 || !reference_frame_ || sent.reference != reference_) return;
+  const Sim3 world_from_reference = WorldFromReference();
+  TrackedFrame other = *reference_frame_;
+  other.world_from_camera = world_from_reference.Pose();
+  const bool shares = frame.NumPoints() < kMaxSharedAtPair;
+  const Sim3 units = Sim3::From({}, 1.0 / world_from_reference.scale);
+  for (const PairPoint& point : FindPairPoints(frame, other)) {
+    const Landmark in_world = InWorld(Sim3::From(frame.world_from_camera), point.in_camera);
+    sent.points[point.keypoint] = InWorld(units, point.in_camera);
+    frame.points[Index(point.keypoint)] = {{{}, keyframe.id, point.keypoint}, in_world};
+    if (!shares) continue;
+    keyframe.shared.push_back({point.keypoint, sent.reference, point.other_keypoint,
+                               world_from_reference.Inverse() * in_world.position_in_world});
   }
 }
 

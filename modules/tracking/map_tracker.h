@@ -87,12 +87,17 @@ class MapTracker {
   State state() const;
   bool has_map() const { return replica_.map().keyframes().size() > 0; }
 
+  // How a frame was found from the last one: where the motion led, only elsewhere or in a wide window (a wide step), or
+  // by so few of the last frame's points that it takes a look at what should be seen, too.
+  enum class StepKind { kUsual, kWide, kDoubtful };
+
   // What is remembered of the last tracked frame.
   struct Last {
     TrackedFrame frame;
     Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
     StepEvidence evidence = StepEvidence::kStrong;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the camera's center, in its axes and those units
+    StepKind step = StepKind::kUsual;
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -104,6 +109,13 @@ class MapTracker {
   struct MotionAt {
     MotionModel model;
     int64_t utime_us = 0;
+  };
+
+  // The best of several tries to find a frame from the last one.
+  struct FollowTries {
+    std::optional<TrackedFrame> best;
+    int num_inliers = 0;  // of the best
+    int num_tries = 0;
   };
 
   struct FramePose {
@@ -129,15 +141,20 @@ class MapTracker {
   std::optional<Drift> DriftNow() const;
   void TakeOverMotion(MonoStart& start);
   void AddScaleDrift(const Rigid3& reference_from_camera);
-  bool FollowLast(TrackedFrame& frame) const;
+  std::optional<StepKind> FollowLast(TrackedFrame& frame) const;
+  bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, const Frame& view,
+             FollowTries& tries) const;
+  std::optional<Rigid3> PoseByPair(const FrameView& view) const;
+  bool FollowPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   bool Relocalize(TrackedFrame& frame) const;
   KnownPoints PointsAround(const TrackedFrame& frame) const;
-  void Remember(TrackedFrame frame, const FramePose& pose);
+  void Remember(TrackedFrame frame, const FramePose& pose, StepKind step);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
   void AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
+  void AddPairPoints(TrackedFrame& frame, KeyframeObservation& keyframe, SentKeyframe& sent) const;
 
   const MapTrackerOptions options_;
   MapReplica replica_;
@@ -148,10 +165,11 @@ class MapTracker {
   std::optional<MotionAt> motion_at_reference_;  // as it was when that keyframe was made
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
-  Rigid3 world_from_start_;        // camera where the next part of the map begins
-  std::optional<Drift> drift_;     // of the last loss
-  double scale_variance_ = 0.0;    // of the logarithm of the scale
-  int64_t previous_utime_us_ = 0;  // of the frame before
+  std::optional<TrackedFrame> reference_frame_;  // as it was when it became a keyframe; nullopt: it is the map's alone
+  Rigid3 world_from_start_;                      // camera where the next part of the map begins
+  std::optional<Drift> drift_;                   // of the last loss
+  double scale_variance_ = 0.0;                  // of the logarithm of the scale
+  int64_t previous_utime_us_ = 0;                // of the frame before
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last
 };

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -102,6 +103,20 @@ TEST_F(Decision, ParallaxIsAReasonForMonoAlone) {
   AskFirst();
   EXPECT_FALSE(Ask(Frame(9, 0, kNumPoints * 88 / 100, 0.2)));
   EXPECT_TRUE(Ask(Frame(10, 0, kNumPoints * 88 / 100, 0.5)));
+}
+
+TEST_F(Decision, MonoKeepsAFrameBeforeItTurnsAwayFromTheReference) {
+  const auto after_turn = [&](SensorType sensor, double turn_rad) {
+    calibration_ = SyntheticWorld(sensor, 0.0, 0).calibration();
+    Start();
+    TrackedFrame frame = Frame(1, 0, kNumPoints);
+    frame.world_from_camera.rotation = ExpSO3({0.0, turn_rad, 0.0});
+    return Ask(frame);
+  };
+  const double field_of_view_rad = 2.0 * std::atan(0.5 * calibration_.width_px / calibration_.fx_px);
+  EXPECT_FALSE(after_turn(SensorType::kMono, 0.19 * field_of_view_rad));
+  EXPECT_TRUE(after_turn(SensorType::kMono, 0.21 * field_of_view_rad)) << "as far again makes more than two fifths";
+  EXPECT_FALSE(after_turn(SensorType::kStereo, 0.21 * field_of_view_rad));
 }
 
 TEST_F(Decision, ManyNewNearKeypointsAndFewKnownOnesMakeAKeyframe) {

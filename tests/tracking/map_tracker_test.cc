@@ -88,6 +88,28 @@ TEST(MapTracker, FollowsAMonoDriveUpToScale) {
   EXPECT_NEAR(scales.back() / scales[scales.size() / 2], 1.0, 0.05);
 }
 
+// Steps of a meter and turns of up to 20 degrees from image to image: neither is near where the last motion leads.
+TEST(MapTracker, FollowsMonoThroughWideStepsAndTurns) {
+  SyntheticWorld world(SensorType::kMono, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  LogicalTime time(3);
+  Mapper mapper{MapperOptions{}};
+  for (int64_t step = 0; step < 20; ++step) {
+    const double yaw_rad = step < 3 ? 0.0 : 0.18 * static_cast<double>(step % 4 < 2 ? 1 : -1);
+    const Rigid3 truth = SyntheticWorld::Pose(2.0 * static_cast<double>(step)) *
+                         Rigid3{ExpSO3({0.0, yaw_rad, 0.0}), Eigen::Vector3d::Zero()};
+    FeatureFrame features = world.Take(step, truth).features;
+    features.utime_us = 500000 * step;
+    for (const auto& delta : time.TakeDeltas(features.frame)) ASSERT_THAT(tracker.ApplyDelta(*delta), IsSuccess());
+    const MapTrackingResult result = tracker.Track(features);
+    if (step > 1) EXPECT_EQ(result.pose.state, TrackingState::kTracked) << step;
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      time.KeyframeSent(keyframe.id, features.frame);
+      time.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
+    }
+  }
+}
+
 TEST(MapTracker, SameFramesGiveTheSameMapAndDroppedOnesDoNotStopIt) {
   const SyntheticWorld world(SensorType::kStereo, 0.3);
   Outcome first, second, dropped;

@@ -1,0 +1,36 @@
+// How the camera moved from one frame to the next by all their keypoints, known points or not: what is left where steps
+// are so wide that the map has hardly anything in view.
+#pragma once
+
+#include <optional>
+
+#include "core/result.h"
+#include "geometry/two_view.h"
+#include "matching/matching.h"
+#include "matching/point_matching.h"
+
+namespace tessera {
+
+struct PairMotionOptions {
+  MatchingOptions matching;  // anywhere in the image
+  TwoViewOptions two_view{
+      .ransac_iterations = 3000, .min_points = 50, .min_parallax_rad = 0.005, .max_rival_share = 1.0};
+  int min_known_points = 8;        // whose depth tells the length of the step
+  double max_depth_spread = 0.25;  // half of them must agree on it within this share
+  double min_cos_expected = 0.8;   // without them: between the step and the expected one
+
+  Result<> Check() const;
+};
+
+// last_from_current, in world units: rotation and direction from the essential matrix (EstimateTwoView), the length as
+// the known points that `last` sees have it: the median over them of their depth by the depth of unit length. Where
+// they are too few or disagree, the length of `expected`, the step (in the last camera's axes) by the motion so far, if
+// the direction is about that one's. nullopt if there is neither, or the two views don't determine the motion.
+//
+// A rival motion doesn't refuse it, as it does at the start: the known points or the motion so far confirm the best
+// one.
+std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameView& current,
+                                         const std::optional<Eigen::Vector3d>& expected,
+                                         const PairMotionOptions& options);
+
+}  // namespace tessera
