@@ -57,6 +57,14 @@ struct Keypoint {
   bool operator==(const Keypoint&) const = default;
 };
 
+// On the image or, moved there because a rolling shutter saw it late or early, beside it by up to half its size.
+inline bool IsNearImage(const Keypoint& keypoint, const CameraCalibration& camera) {
+  const double margin_x_px = 0.5 * camera.width_px, margin_y_px = 0.5 * camera.height_px;
+  const auto x_px = static_cast<double>(keypoint.x_px), y_px = static_cast<double>(keypoint.y_px);
+  return x_px >= -margin_x_px && x_px <= camera.width_px + margin_x_px && y_px >= -margin_y_px &&
+         y_px <= camera.height_px + margin_y_px;
+}
+
 // The features of one image: keypoints[i] belongs to descriptors[i]; order fixed by (level, y, x).
 struct FeatureFrame {
   FrameId frame;

@@ -25,6 +25,8 @@ constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
+// Of two frames, for their poses to tell how the camera moved while an image was read.
+constexpr double kMaxFrameInterval_s = 0.07;
 
 // A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark. `covariance`: of the
 // point, if its depth isn't known by the view itself.
@@ -42,6 +44,22 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
   point.min_distance = point.max_distance / LevelScale(kTopLevel);
   point.descriptor = view.descriptor(keypoint);
   return point;
+}
+
+double DepthIn(const TrackedFrame& frame, const SeenPoint& point) {
+  return (frame.world_from_camera.Inverse() * point.landmark.position_in_world).z();
+}
+
+// Of the points that it sees; 0: none.
+double MedianDepth(const TrackedFrame& frame) {
+  std::vector<double> depths;
+  for (const SeenPoint& point : frame.points) {
+    if (point.valid()) depths.push_back(DepthIn(frame, point));
+  }
+  if (depths.empty()) return 0.0;
+  const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
 }
 
 }  // namespace
@@ -213,12 +231,14 @@ void MapTracker::UpdateLast() {
 // The frame becomes the last one if its pose can be found in the map around that one.
 bool MapTracker::Localize(const Frame& view) {
   TrackedFrame frame(view);
+  frame.view = Unrolled(view, frame, last_->mean_motion);
   std::optional<StepKind> step;
   if (!lost_since_us_) step = FollowLast(frame);
   if (!step) {
     if (!Relocalize(frame)) return false;
     step = StepKind::kDoubtful;
   }
+  frame.view = Unrolled(view, frame, MotionOf(frame));
   const KnownPoints around = PointsAround(frame);
   MatchLocal(around, options_.matching.local_radius_px, options_.matching, frame);
   const int min_of_last = static_cast<int>(options_.min_share_of_last * last_->frame.NumPoints());
@@ -230,6 +250,39 @@ bool MapTracker::Localize(const Frame& view) {
   if (!lost_since_us_ && step == StepKind::kDoubtful && Coverage(around, frame) < kMinCoverage) return false;
   Remember(std::move(frame), pose, *step);
   return true;
+}
+
+// How the camera moved from the last frame to this one; nullopt where that says nothing about the time of a readout.
+std::optional<CameraMotion> MapTracker::MeanMotionOf(const TrackedFrame& frame) const {
+  const double interval_s = SinceLast(*frame.view);
+  if (lost_since_us_ || interval_s <= 0.0 || interval_s > kMaxFrameInterval_s) return std::nullopt;
+  return MotionOver(last_->frame.world_from_camera.Inverse() * frame.world_from_camera, interval_s);
+}
+
+// While the frame was read: the mean motion is that of half an interval ago.
+std::optional<CameraMotion> MapTracker::MotionOf(const TrackedFrame& frame) const {
+  std::optional<CameraMotion> motion = MeanMotionOf(frame);
+  if (!motion || !last_->mean_motion) return motion;
+  motion->velocity += 0.5 * (motion->velocity - last_->mean_motion->velocity);
+  motion->turn_rate += 0.5 * (motion->turn_rate - last_->mean_motion->turn_rate);
+  return motion;
+}
+
+// As the keypoints would be seen if all rows were read at once, with the depths of the points that `frame` sees.
+MapTracker::Frame MapTracker::Unrolled(const Frame& rolled, const TrackedFrame& frame,
+                                       const std::optional<CameraMotion>& motion) const {
+  if (readout_.readout_s() == 0.0 || !motion) return rolled;
+  const double usual_depth = MedianDepth(last_->frame);
+  std::vector<double> depths(frame.points.size(), usual_depth);
+  for (size_t i = 0; i < depths.size(); ++i) {
+    const double measured_m = static_cast<double>(rolled->keypoint(static_cast<int>(i)).depth_m);
+    if (frame.points[i].valid()) {
+      depths[i] = DepthIn(frame, frame.points[i]);
+    } else if (measured_m > 0.0) {
+      depths[i] = measured_m;
+    }
+  }
+  return std::make_shared<const FrameView>(Unroll(rolled->features(), depths, readout_.readout_s(), *motion));
 }
 
 std::optional<MotionPrediction> MapTracker::PredictMotion(const FrameView& view) const {
@@ -426,8 +479,17 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, StepKind st
     motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera, covariance, interval_s,
                 pose.evidence == StepEvidence::kWeak);
   }
+  camera_motion_ = MotionOf(frame);
+  const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
+  LearnReadout(frame);
   lost_since_us_.reset();
-  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, step});
+  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, step});
+}
+
+void MapTracker::LearnReadout(const TrackedFrame& frame) {
+  const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_);
+  if (!camera_motion_ || !camera_motion_at_reference_ || !world_from_reference) return;
+  readout_.Add(frame, *camera_motion_, {world_from_reference->Pose(), *camera_motion_at_reference_});
 }
 
 void MapTracker::AddScaleDrift(const Rigid3& reference_from_camera) {
@@ -440,6 +502,8 @@ void MapTracker::AddScaleDrift(const Rigid3& reference_from_camera) {
 void MapTracker::ResetMotion() {
   motion_.Reset();
   motion_at_reference_.reset();
+  camera_motion_.reset();
+  camera_motion_at_reference_.reset();
 }
 
 // Of the last frame that was tracked; nullopt: it did not move steadily.
@@ -520,6 +584,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
   reference_frame_ = frame;
+  camera_motion_at_reference_ = camera_motion_;
   ++next_keyframe_.value;
   if (last_) last_->reference_from_camera = Rigid3::Identity();
   return keyframe;

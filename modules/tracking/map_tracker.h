@@ -22,6 +22,7 @@
 #include "tracking/keyframe_decision.h"
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
+#include "tracking/readout_estimator.h"
 
 namespace tessera {
 
@@ -96,7 +97,8 @@ class MapTracker {
     TrackedFrame frame;
     Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
     StepEvidence evidence = StepEvidence::kStrong;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the camera's center, in its axes and those units
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    // of the camera's center, in its axes and those units
+    std::optional<CameraMotion> mean_motion = std::nullopt;  // since the frame before, in units of the world
     StepKind step = StepKind::kUsual;
   };
 
@@ -132,6 +134,10 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
   bool Localize(const Frame& view);
+  std::optional<CameraMotion> MeanMotionOf(const TrackedFrame& frame) const;
+  std::optional<CameraMotion> MotionOf(const TrackedFrame& frame) const;
+  Frame Unrolled(const Frame& rolled, const TrackedFrame& frame, const std::optional<CameraMotion>& motion) const;
+  void LearnReadout(const TrackedFrame& frame);
   Sim3 WorldFromReference() const;                // identity before there is a reference
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
@@ -163,6 +169,9 @@ class MapTracker {
   std::optional<Last> last_;                     // nullopt: no part of the map is followed
   MotionModel motion_;                           // in the reference's units
   std::optional<MotionAt> motion_at_reference_;  // as it was when that keyframe was made
+  ReadoutEstimator readout_;
+  std::optional<CameraMotion> camera_motion_;  // of the last frame, while it was read; in units of the world
+  std::optional<CameraMotion> camera_motion_at_reference_;  // likewise
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
   std::optional<TrackedFrame> reference_frame_;  // as it was when it became a keyframe; nullopt: it is the map's alone

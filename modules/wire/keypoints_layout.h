@@ -9,11 +9,8 @@
 
 namespace tessera {
 
-// Keypoints of coarse levels may round to just beyond the last pixel.
 inline bool IsInRange(const Keypoint& keypoint, const CameraCalibration& camera) {
-  return keypoint.x_px >= -1.0F && keypoint.x_px <= static_cast<float>(camera.width_px) && keypoint.y_px >= -1.0F &&
-         keypoint.y_px <= static_cast<float>(camera.height_px) && keypoint.level < kMaxLevels &&
-         keypoint.depth_m >= 0.0F;
+  return IsNearImage(keypoint, camera) && keypoint.level < kMaxLevels && keypoint.depth_m >= 0.0F;
 }
 
 // `more`: columns of the enclosing message with one item for each keypoint.

@@ -1,0 +1,86 @@
+#include "tracking/readout_estimator.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <random>
+
+namespace tessera {
+namespace {
+
+CameraCalibration Camera() {
+  return {.sensor = SensorType::kMono,
+          .width_px = 640,
+          .height_px = 480,
+          .fx_px = 500,
+          .fy_px = 500,
+          .cx_px = 320,
+          .cy_px = 240};
+}
+
+// Frames of a camera at the world's origin that turns by rates that change from frame to frame. It sees points that are
+// known, its rows are read within `readout_s`, and its keypoints are moved by what the estimator holds true.
+class ReadoutEstimatorTest : public ::testing::Test {
+ protected:
+  void Show(int num_frames, double readout_s) {
+    for (int i = 0; i < num_frames; ++i) {
+      const CameraMotion motion{{}, {0.1 * gaussian_(random_), 0.8 * gaussian_(random_), 0.1 * gaussian_(random_)}};
+      estimator_.Add(FrameOf(motion, readout_s), motion, {Rigid3::Identity(), CameraMotion{}});
+    }
+  }
+
+  TrackedFrame FrameOf(const CameraMotion& motion, double readout_s) {
+    FeatureFrame features;
+    features.calibration = Camera();
+    std::vector<SeenPoint> points;
+    std::vector<double> depths;
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector2d pixel(640.0 * uniform_(random_), 480.0 * uniform_(random_));
+      const Eigen::Vector3d point = (1.0 + 3.0 * uniform_(random_)) * Camera().Ray(pixel);
+      const double time_s = readout_s * RowTime(Camera(), pixel.y());
+      const Eigen::Vector2d seen = Camera().Project(ExpSO3(-time_s * motion.turn_rate) * point);
+      Keypoint keypoint;
+      keypoint.x_px = static_cast<float>(seen.x() + 0.5 * gaussian_(random_));
+      keypoint.y_px = static_cast<float>(seen.y() + 0.5 * gaussian_(random_));
+      features.keypoints.push_back(keypoint);
+      depths.push_back(point.z());
+      SeenPoint seen_point{{LandmarkId{i}, {}, -1}, {}};
+      seen_point.landmark.position_in_world = point;
+      points.push_back(seen_point);
+    }
+    features.descriptors.resize(features.keypoints.size());
+    TrackedFrame frame(std::make_shared<const FrameView>(Unroll(features, depths, estimator_.readout_s(), motion)));
+    frame.points = std::move(points);
+    return frame;
+  }
+
+  ReadoutEstimator estimator_;
+  std::mt19937 random_{7};
+  std::normal_distribution<double> gaussian_{0.0, 1.0};
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
+};
+
+TEST_F(ReadoutEstimatorTest, FindsTheReadoutOfARollingShutter) {
+  Show(200, 0.025);
+  EXPECT_NEAR(estimator_.readout_s(), 0.025, 0.001);
+}
+
+TEST_F(ReadoutEstimatorTest, AFewFramesDontTellAReadoutFromNone) {
+  Show(3, 0.025);
+  EXPECT_EQ(estimator_.readout_s(), 0.0);
+}
+
+TEST_F(ReadoutEstimatorTest, AGlobalShutterHasNone) {
+  Show(200, 0.0);
+  EXPECT_EQ(estimator_.readout_s(), 0.0);
+}
+
+TEST_F(ReadoutEstimatorTest, FramesOfFewPointsTellNothing) {
+  TrackedFrame frame = FrameOf({{}, {0.0, 1.0, 0.0}}, 0.025);
+  for (size_t i = 40; i < frame.points.size(); ++i) frame.points[i] = {};
+  for (int i = 0; i < 100; ++i) estimator_.Add(frame, {{}, {0.0, 1.0, 0.0}}, {});
+  EXPECT_EQ(estimator_.readout_s(), 0.0);
+}
+
+}  // namespace
+}  // namespace tessera
