@@ -414,7 +414,8 @@ bool MapTracker::FollowPair(const Frame& view, std::vector<KeyframeObservation>&
   const double sigma = kPairSigmaShare * reference_from_camera.translation.norm();
   const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
   if (interval_s > 0.0) motion_.Add(reference_from_camera, covariance, interval_s, true);
-  last_.emplace(Last{std::move(frame), reference_from_camera, StepEvidence::kWeak, covariance, StepKind::kDoubtful});
+  last_.emplace(Last{std::move(frame), reference_from_camera, StepEvidence::kWeak, covariance, std::nullopt,
+                     StepKind::kDoubtful});
   AddScaleDrift(reference_from_camera);
   keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
   return true;
