@@ -22,6 +22,9 @@ constexpr double kDriftInterval_s = 0.1;
 // points, agree with it. At usual steps 0.77 and 0.44 is the least that was seen (KITTI 03); walls and fences seen one
 // window too far gave up to 0.66 and 0.37.
 constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
+// Or if a steady motion knew, to this standard deviation, where points are seen, and the camera turned as predicted. In
+// the open, where points fade from frame to frame, no other try is better.
+constexpr double kMaxPredictionSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
@@ -368,6 +371,12 @@ std::optional<MapTracker::StepKind> MapTracker::FollowLast(TrackedFrame& frame) 
   return tries.num_tries == 1 ? StepKind::kUsual : StepKind::kWide;
 }
 
+// How well a prior knows where the last frame's points are seen, by its translation; pixels.
+double MapTracker::SigmaInImage(const PosePrior& prior) const {
+  const double sigma = std::sqrt(prior.information.inverse().trace() / 3.0);
+  return last_->frame.view->calibration().fx_px * sigma / MedianDepth(last_->frame);
+}
+
 // Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
 bool MapTracker::TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, const Frame& view,
                        FollowTries& tries) const {
@@ -377,12 +386,15 @@ bool MapTracker::TryAt(const Rigid3& world_from_camera, double widening, const P
   const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
   if (num < options_.min_last_matches) return false;
   const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
+  const double turn_rad = LogSO3(world_from_camera.rotation.conjugate() * frame.world_from_camera.rotation).norm();
   if (num_inliers > tries.num_inliers) {
     tries.num_inliers = num_inliers;
     tries.best = std::move(frame);
   }
-  return num_inliers >= options_.min_last_matches / 2 && num_inliers > kMinShareOfMatches * num &&
-         num_inliers > kMinShareOfLast * last_->frame.NumPoints();
+  if (num_inliers < options_.min_last_matches / 2) return false;
+  const bool is_narrow = prior != nullptr && SigmaInImage(*prior) < kMaxPredictionSigma_px;
+  if (is_narrow && turn_rad < kMaxTurnFromPrediction_rad) return true;
+  return num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_->frame.NumPoints();
 }
 
 // Mono: where the last frame and this one by themselves show the camera.

@@ -148,6 +148,7 @@ class MapTracker {
   void TakeOverMotion(MonoStart& start);
   void AddScaleDrift(const Rigid3& reference_from_camera);
   std::optional<StepKind> FollowLast(TrackedFrame& frame) const;
+  double SigmaInImage(const PosePrior& prior) const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, const Frame& view,
              FollowTries& tries) const;
   std::optional<Rigid3> PoseByPair(const FrameView& view) const;
