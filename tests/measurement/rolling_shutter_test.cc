@@ -55,7 +55,7 @@ TEST(RollingShutter, KeypointsMoveToWhereTheMiddleRowsPoseSeesThem) {
 TEST(RollingShutter, FarPointsMoveWithTheRotationAlone) {
   const FeatureFrame frame = FrameOf({{100.0, 50.0}}, 0.0);
   const Keypoint far = Unroll(frame, {0.0}, kReadout_s, kMotion).keypoints[0];
-  const Keypoint turned = Unroll(frame, {1.0}, kReadout_s, {{}, kMotion.turn_rate}).keypoints[0];
+  const Keypoint turned = Unroll(frame, {1.0}, kReadout_s, {Eigen::Vector3d::Zero(), kMotion.turn_rate}).keypoints[0];
   EXPECT_EQ(far, turned);
   EXPECT_EQ(far.depth_m, 0.0F);
 }
@@ -67,7 +67,7 @@ TEST(RollingShutter, TheMiddleRowStaysWhereItIs) {
 
 TEST(RollingShutter, KeypointsThatWouldLeaveTheSurroundingsOfTheImageStay) {
   const FeatureFrame frame = FrameOf({{600.0, 470.0}}, 2.0);
-  EXPECT_EQ(Unroll(frame, {2.0}, 1.0, {{}, {0.0, 2.5, 0.0}}).keypoints, frame.keypoints);
+  EXPECT_EQ(Unroll(frame, {2.0}, 1.0, {Eigen::Vector3d::Zero(), {0.0, 2.5, 0.0}}).keypoints, frame.keypoints);
 }
 
 TEST(RollingShutter, MotionOverAnIntervalIsThatOfItsStep) {

@@ -18,13 +18,16 @@ CameraCalibration Camera() {
           .cy_px = 240};
 }
 
+CameraMotion Turning() { return {Eigen::Vector3d::Zero(), {0.0, 1.0, 0.0}}; }
+
 // Frames of a camera at the world's origin that turns by rates that change from frame to frame. It sees points that are
 // known, its rows are read within `readout_s`, and its keypoints are moved by what the estimator holds true.
 class ReadoutEstimatorTest : public ::testing::Test {
  protected:
   void Show(int num_frames, double readout_s) {
     for (int i = 0; i < num_frames; ++i) {
-      const CameraMotion motion{{}, {0.1 * gaussian_(random_), 0.8 * gaussian_(random_), 0.1 * gaussian_(random_)}};
+      const CameraMotion motion{Eigen::Vector3d::Zero(),
+                                {0.1 * gaussian_(random_), 0.8 * gaussian_(random_), 0.1 * gaussian_(random_)}};
       estimator_.Add(FrameOf(motion, readout_s), motion, {Rigid3::Identity(), CameraMotion{}});
     }
   }
@@ -76,9 +79,9 @@ TEST_F(ReadoutEstimatorTest, AGlobalShutterHasNone) {
 }
 
 TEST_F(ReadoutEstimatorTest, FramesOfFewPointsTellNothing) {
-  TrackedFrame frame = FrameOf({{}, {0.0, 1.0, 0.0}}, 0.025);
+  TrackedFrame frame = FrameOf(Turning(), 0.025);
   for (size_t i = 40; i < frame.points.size(); ++i) frame.points[i] = {};
-  for (int i = 0; i < 100; ++i) estimator_.Add(frame, {{}, {0.0, 1.0, 0.0}}, {});
+  for (int i = 0; i < 100; ++i) estimator_.Add(frame, Turning(), {});
   EXPECT_EQ(estimator_.readout_s(), 0.0);
 }
 
