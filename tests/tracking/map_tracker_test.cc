@@ -102,7 +102,9 @@ TEST(MapTracker, FollowsMonoThroughWideStepsAndTurns) {
     features.utime_us = 500000 * step;
     for (const auto& delta : time.TakeDeltas(features.frame)) ASSERT_THAT(tracker.ApplyDelta(*delta), IsSuccess());
     const MapTrackingResult result = tracker.Track(features);
-    if (step > 1) EXPECT_EQ(result.pose.state, TrackingState::kTracked) << step;
+    if (step > 1) {
+      EXPECT_EQ(result.pose.state, TrackingState::kTracked) << step;
+    }
     for (const KeyframeObservation& keyframe : result.keyframes) {
       time.KeyframeSent(keyframe.id, features.frame);
       time.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
