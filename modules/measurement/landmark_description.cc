@@ -10,10 +10,7 @@
 namespace tessera {
 namespace {
 
-// Two views agree on a depth whatever they see, also where their keypoints only look alike: it takes a third one to
-// confirm it. Until then the depth is known to half of itself.
 constexpr size_t kConfirmingObservations = 3;
-constexpr double kUnconfirmedShare = 0.5;
 constexpr double kMaxKnownShare = 0.6;  // of the distance
 
 Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in_world,
@@ -68,6 +65,18 @@ double DepthInformation(const FeatureFrame& features, int32_t keypoint, const Ri
 
 double DepthSigma(double information, double distance) {
   return std::min(kMaxDepthShare * distance, 1.0 / std::sqrt(information));
+}
+
+Landmark DescribeInCamera(const FeatureFrame& features, int32_t keypoint, const Eigen::Vector3d& point_in_camera) {
+  const auto i = static_cast<size_t>(keypoint);
+  const double distance = point_in_camera.norm();
+  Landmark landmark;
+  landmark.position_in_world = point_in_camera;
+  landmark.normal = -point_in_camera / distance;
+  landmark.max_distance = distance * LevelScale(features.keypoints[i].level);
+  landmark.min_distance = landmark.max_distance / LevelScale(kTopLevel);
+  landmark.descriptor = features.descriptors[i];
+  return landmark;
 }
 
 bool HasDepth(const Landmark& landmark, const Eigen::Vector3d& camera_in_world) {

@@ -23,6 +23,14 @@ Landmark DescribeMovedLandmark(const Map& map, LandmarkId id);
 
 inline constexpr int kMaxDescriptors = 12;
 
+// Two views agree on a depth whatever they see, also where their keypoints only look alike: it takes a third one to
+// confirm it. Until then the depth is known to this share of itself.
+inline constexpr double kUnconfirmedShare = 0.5;
+
+// A point that one keypoint shows, in the frame of its camera: normal, distance range and descriptor as above, but
+// depth_sigma is left 0, for the caller to say.
+Landmark DescribeInCamera(const FeatureFrame& features, int32_t keypoint, const Eigen::Vector3d& point_in_camera);
+
 // What one observation says about the landmark's position along its normal, the camera's pose taken as exact: the
 // inverse of a variance, 1 / m^2 (mono: in units of the map). 0 where the landmark stands behind the camera.
 double DepthInformation(const FeatureFrame& features, int32_t keypoint, const Rigid3& world_from_camera,

@@ -31,21 +31,15 @@ constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themsel
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
 
-// A point as one view alone knows it, in the frame of its camera; fields as in DescribeLandmark. `covariance`: of the
-// point, if its depth isn't known by the view itself.
+// A point as one view alone knows it, in the frame of its camera. `covariance`: of the point, if its depth isn't known
+// by the view itself.
 Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera,
                  const Eigen::Matrix3d* covariance = nullptr) {
-  Landmark point;
-  const double distance = point_in_camera.norm();
-  point.position_in_world = point_in_camera;
-  point.normal = -point_in_camera / distance;
+  Landmark point = DescribeInCamera(view.features(), keypoint, point_in_camera);
   const double information = covariance != nullptr
                                  ? 1.0 / point.normal.dot(*covariance * point.normal)
                                  : DepthInformation(view.features(), keypoint, Rigid3::Identity(), point);
-  point.depth_sigma = DepthSigma(information, distance);
-  point.max_distance = distance * LevelScale(view.keypoint(keypoint).level);
-  point.min_distance = point.max_distance / LevelScale(kTopLevel);
-  point.descriptor = view.descriptor(keypoint);
+  point.depth_sigma = DepthSigma(information, point_in_camera.norm());
   return point;
 }
 
@@ -392,9 +386,8 @@ bool MapTracker::TryAt(const Rigid3& world_from_camera, double widening, const P
     tries.best = std::move(frame);
   }
   if (num_inliers < options_.min_last_matches / 2) return false;
-  const bool is_narrow = prior != nullptr && SigmaInImage(*prior) < kMaxPredictionSigma_px;
-  if (is_narrow && turn_rad < kMaxTurnFromPrediction_rad) return true;
-  return num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_->frame.NumPoints();
+  if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_->frame.NumPoints()) return true;
+  return prior != nullptr && turn_rad < kMaxTurnFromPrediction_rad && SigmaInImage(*prior) < kMaxPredictionSigma_px;
 }
 
 // Mono: where the last frame and this one by themselves show the camera.

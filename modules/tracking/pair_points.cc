@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <optional>
 
-#include "features/pyramid.h"
 #include "matching/epipolar_search.h"
 #include "measurement/landmark_description.h"
 
 namespace tessera {
 namespace {
 
-constexpr double kUnconfirmedShare = 0.5;  // of the depth
-constexpr size_t kMinDepths = 20;          // fewer known points don't tell how near others may be
+constexpr size_t kMinDepths = 20;  // fewer known points don't tell how near others may be
 constexpr double kMinStep = 1e-9;
 
 // Of the nearest points that the pair may see, along the frame's optical axis.
@@ -37,16 +35,11 @@ std::vector<char> UsedKeypoints(const TrackedFrame& other) {
 
 Landmark Describe(const FrameView& view, int32_t keypoint, const FrameView& other, int32_t other_keypoint,
                   const Rigid3& other_from_camera, const Eigen::Vector3d& point_in_camera) {
-  Landmark point;
+  Landmark point = DescribeInCamera(view.features(), keypoint, point_in_camera);
   const double distance = point_in_camera.norm();
-  point.position_in_world = point_in_camera;
-  point.normal = -point_in_camera / distance;
   const double information = DepthInformation(view.features(), keypoint, Rigid3::Identity(), point) +
                              DepthInformation(other.features(), other_keypoint, other_from_camera.Inverse(), point);
   point.depth_sigma = std::max(kUnconfirmedShare * distance, DepthSigma(information, distance));
-  point.max_distance = distance * LevelScale(view.keypoint(keypoint).level);
-  point.min_distance = point.max_distance / LevelScale(kTopLevel);
-  point.descriptor = view.descriptor(keypoint);
   return point;
 }
 
