@@ -17,4 +17,11 @@ double Quantile(const std::vector<Number>& sorted, double q) {
   return (1.0 - fraction) * static_cast<double>(sorted[below]) + fraction * static_cast<double>(sorted[above]);
 }
 
+// The value at index n q of n > 0 values in rising order, rounded down: one of them.
+inline double OrderStatistic(std::vector<double> values, double q) {
+  const auto at = values.begin() + static_cast<ptrdiff_t>(q * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 }  // namespace tessera

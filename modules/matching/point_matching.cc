@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
+
+#include "core/quantile.h"
 
 namespace tessera {
 namespace {
@@ -42,6 +45,15 @@ Result<> MatchOptions::Check() const {
 
 int TrackedFrame::NumPoints() const {
   return static_cast<int>(std::count_if(points.begin(), points.end(), [](const SeenPoint& p) { return p.valid(); }));
+}
+
+double TrackedFrame::MedianDepth() const {
+  const Rigid3 camera_from_world = world_from_camera.Inverse();
+  std::vector<double> depths;
+  for (const SeenPoint& point : points) {
+    if (point.valid()) depths.push_back((camera_from_world * point.landmark.position_in_world).z());
+  }
+  return depths.empty() ? 0.0 : OrderStatistic(std::move(depths), 0.5);
 }
 
 int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& options, TrackedFrame& frame) {

@@ -37,6 +37,8 @@ struct TrackedFrame {
       : view(std::move(frame_view)), points(static_cast<size_t>(view->size())) {}
 
   int NumPoints() const;
+  // Along the optical axis, of the points that it sees; 0 if it sees none.
+  double MedianDepth() const;
 
   std::shared_ptr<const FrameView> view;
   Rigid3 world_from_camera;

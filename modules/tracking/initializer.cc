@@ -1,6 +1,8 @@
 #include "tracking/initializer.h"
 
-#include <algorithm>
+#include <utility>
+
+#include "core/quantile.h"
 
 namespace tessera {
 namespace {
@@ -11,9 +13,7 @@ void NormalizeDepth(MonoStart& start) {
   for (const MonoStart::Point& point : start.points) {
     depths.push_back(point.point.point_in_world.z());
   }
-  const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  const double scale = 1.0 / *middle;
+  const double scale = 1.0 / OrderStatistic(std::move(depths), 0.5);
   start.second_from_first.translation *= scale;
   for (MonoStart::Point& point : start.points) {
     point.point.point_in_world *= scale;

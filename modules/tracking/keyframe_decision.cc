@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/quantile.h"
 #include "geometry/triangulation.h"
 #include "measurement/landmark_description.h"
 
 namespace tessera {
 namespace {
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Far points stay in view for long, and tell nothing about how much of what is near has gone.
 bool IsKnown(const SeenPoint& point, const TrackedFrame& frame) {
@@ -57,7 +52,8 @@ KeyframeDecision::Seen KeyframeDecision::See(const TrackedFrame& frame, const Ri
                                   frame.world_from_camera.translation));
   }
   std::sort(seen.points.begin(), seen.points.end());
-  if (!cosines.empty()) seen.median_parallax_rad = std::acos(std::clamp(Median(std::move(cosines)), -1.0, 1.0));
+  if (!cosines.empty())
+    seen.median_parallax_rad = std::acos(std::clamp(OrderStatistic(std::move(cosines), 0.5), -1.0, 1.0));
   return seen;
 }
 

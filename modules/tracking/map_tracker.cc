@@ -5,11 +5,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
 #include "measurement/landmark_description.h"
 #include "tracking/local_points.h"
-#include "tracking/pair_motion.h"
 #include "tracking/pair_points.h"
 
 namespace tessera {
@@ -18,13 +16,6 @@ namespace {
 // Of the points that agree on a pose by themselves: fewer that agree with the motion of a moment ago contradict it.
 constexpr double kMinShareWithMotion = 0.5;
 constexpr double kDriftInterval_s = 0.1;
-// A try to follow the last frame has found the true pose if these shares of the matches, and of the last frame's
-// points, agree with it. At usual steps 0.77 and 0.44 is the least that was seen (KITTI 03); walls and fences seen one
-// window too far gave up to 0.66 and 0.37.
-constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
-// Or if a steady motion knew, to this standard deviation, where points are seen, and the camera turned as predicted. In
-// the open, where points fade from frame to frame, no other try is better.
-constexpr double kMaxPredictionSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
@@ -43,31 +34,14 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
   return point;
 }
 
-double DepthIn(const TrackedFrame& frame, const SeenPoint& point) {
-  return (frame.world_from_camera.Inverse() * point.landmark.position_in_world).z();
-}
-
-// Of the points that it sees; 0: none.
-double MedianDepth(const TrackedFrame& frame) {
-  std::vector<double> depths;
-  for (const SeenPoint& point : frame.points) {
-    if (point.valid()) depths.push_back(DepthIn(frame, point));
-  }
-  if (depths.empty()) return 0.0;
-  const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
-}
-
 }  // namespace
 
 Result<> MapTrackerOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(start.Check());
-  TESSERA_RETURN_IF_FAILED(matching.Check());
+  TESSERA_RETURN_IF_FAILED(search.Check());
   TESSERA_RETURN_IF_FAILED(keyframes.Check());
   TESSERA_RETURN_IF_FAILED(Require(max_unanswered_keyframes >= 2, "max_unanswered_keyframes must be at least 2"));
-  TESSERA_RETURN_IF_FAILED(Require(min_inliers >= 6, "min_inliers must be at least 6"));
-  return Require(max_local_keyframes >= 1, "max_local_keyframes must be at least 1");
+  return Require(min_inliers >= 6, "min_inliers must be at least 6");
 }
 
 MapTracker::MapTracker(const MapTrackerOptions& options)
@@ -91,7 +65,9 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   // The answer may be for this frame, which it has localized then, or for one before, which this one follows.
   const bool is_localized = is_answered && answer->frame == features.frame;
 
-  if (is_localized || (last_ && Localize(view))) {
+  std::optional<FrameSearch> search;
+  if (last_ && !is_localized) search.emplace(SearchFor(view));
+  if (is_localized || (search && Localize(view, *search))) {
     result.pose.num_matches = last_->frame.NumPoints();
     result.pose.is_relocalized = before == State::kLost || is_answered;
     result.pose.state = TrackingState::kTracked;
@@ -99,7 +75,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
       if (view->baseline_m() == 0.0) AddScaleDrift(last_->reference_from_camera);
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
     }
-  } else if (before == State::kTracking && FollowPair(view, result.keyframes)) {
+  } else if (before == State::kTracking && search && FollowPair(*search, result.keyframes)) {
     result.pose.num_matches = last_->frame.NumPoints();
     result.pose.state = TrackingState::kTracked;
   } else if (may_ask && CanAskFor(*view)) {
@@ -225,27 +201,43 @@ void MapTracker::UpdateLast() {
   }
 }
 
-// The frame becomes the last one if its pose can be found in the map around that one.
-bool MapTracker::Localize(const Frame& view) {
-  TrackedFrame frame(view);
-  frame.view = Unrolled(view, frame, last_->mean_motion);
-  std::optional<StepKind> step;
-  if (!lost_since_us_) step = FollowLast(frame);
-  if (!step) {
-    if (!Relocalize(frame)) return false;
-    step = StepKind::kDoubtful;
+// Where the motion so far leads.
+ExpectedFrame MapTracker::Expect(const FrameView& view) const {
+  const std::optional<MotionPrediction> motion = PredictMotion(view);
+  const Rigid3 last_from_current = motion ? motion->last_from_current : Rigid3::Identity();
+  const Sim3 world_from_reference = WorldFromReference();
+  ExpectedFrame expected;
+  expected.world_from_camera = (world_from_reference * (last_->reference_from_camera * last_from_current)).Pose();
+  if (motion) {
+    expected.step = world_from_reference.scale * motion->last_from_current.translation;
+    expected.prior = PriorOf(*motion);
   }
+  return expected;
+}
+
+FrameSearch MapTracker::SearchFor(const Frame& view) const {
+  return {Unrolled(view, TrackedFrame(view), last_->mean_motion), last_->frame, Expect(*view), replica_,
+          options_.search};
+}
+
+// The frame becomes the last one if its pose can be found in the map around that one.
+bool MapTracker::Localize(const Frame& view, FrameSearch& search) {
+  std::optional<FoundFrame> found;
+  if (!lost_since_us_) found = search.Follow();
+  if (!found) found = search.FindAnywhere();
+  if (!found) return false;
+  TrackedFrame& frame = found->frame;
   frame.view = Unrolled(view, frame, MotionOf(frame));
-  const KnownPoints around = PointsAround(frame);
-  MatchLocal(around, options_.matching.local_radius_px, options_.matching, frame);
+  const KnownPoints around = LocalPoints(replica_, frame, options_.search.max_local_keyframes);
+  MatchLocal(around, options_.search.matching.local_radius_px, options_.search.matching, frame);
   const int min_of_last = static_cast<int>(options_.min_share_of_last * last_->frame.NumPoints());
   const int min_inliers =
       lost_since_us_ ? options_.min_relocalized_inliers : std::max(options_.min_inliers, min_of_last);
   const FramePose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < min_inliers) return false;
   // After a loss the greater number of inliers says as much.
-  if (!lost_since_us_ && step == StepKind::kDoubtful && Coverage(around, frame) < kMinCoverage) return false;
-  Remember(std::move(frame), pose, *step);
+  if (!lost_since_us_ && found->is_doubtful && Coverage(around, frame) < kMinCoverage) return false;
+  Remember(std::move(frame), pose, found->is_wide);
   return true;
 }
 
@@ -269,12 +261,13 @@ std::optional<CameraMotion> MapTracker::MotionOf(const TrackedFrame& frame) cons
 MapTracker::Frame MapTracker::Unrolled(const Frame& rolled, const TrackedFrame& frame,
                                        const std::optional<CameraMotion>& motion) const {
   if (readout_.readout_s() == 0.0 || !motion) return rolled;
-  const double usual_depth = MedianDepth(last_->frame);
+  const double usual_depth = last_->frame.MedianDepth();
+  const Rigid3 camera_from_world = frame.world_from_camera.Inverse();
   std::vector<double> depths(frame.points.size(), usual_depth);
   for (size_t i = 0; i < depths.size(); ++i) {
     const double measured_m = static_cast<double>(rolled->keypoint(static_cast<int>(i)).depth_m);
     if (frame.points[i].valid()) {
-      depths[i] = DepthIn(frame, frame.points[i]);
+      depths[i] = (camera_from_world * frame.points[i].landmark.position_in_world).z();
     } else if (measured_m > 0.0) {
       depths[i] = measured_m;
     }
@@ -308,15 +301,15 @@ std::optional<PosePrior> MapTracker::PriorOf(const MotionPrediction& motion) con
 MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
   const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
   const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
-  if (!prior) return {OptimizeFramePose(options_.pose, nullptr, frame), StepEvidence::kStrong};
+  if (!prior) return {OptimizeFramePose(options_.search.pose, nullptr, frame), StepEvidence::kStrong};
   TrackedFrame carried = frame;
-  const PoseOptimizationResult with_motion = OptimizeFramePose(options_.pose, &*prior, carried);
+  const PoseOptimizationResult with_motion = OptimizeFramePose(options_.search.pose, &*prior, carried);
   TrackedFrame seen = carried;
-  PoseOptimizationResult by_images = OptimizeFramePose(options_.pose, nullptr, seen);
+  PoseOptimizationResult by_images = OptimizeFramePose(options_.search.pose, nullptr, seen);
   // Unless most points contradict the motion: the camera may have been carried away. That is told, not overruled.
   if (by_images.num_inliers < kMinShareWithMotion * frame.NumPoints()) {
     TrackedFrame alone = frame;
-    const PoseOptimizationResult by_all = OptimizeFramePose(options_.pose, nullptr, alone);
+    const PoseOptimizationResult by_all = OptimizeFramePose(options_.search.pose, nullptr, alone);
     if (by_images.num_inliers < kMinShareWithMotion * by_all.num_inliers) {
       by_images = by_all;
       seen = std::move(alone);
@@ -332,118 +325,29 @@ MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const 
   return {is_carried ? with_motion : by_images, evidence};
 }
 
-KnownPoints MapTracker::PointsAround(const TrackedFrame& frame) const {
-  return LocalPoints(replica_, frame, options_.max_local_keyframes);
-}
-
-// In windows around where the motion leads, ever wider; then from where the points around the last frame are found by
-// descriptor alone, and from how the two frames as such show the motion. The first clear try ends it, else the best one
-// counts, if any has enough inliers.
-std::optional<MapTracker::StepKind> MapTracker::FollowLast(TrackedFrame& frame) const {
-  const Frame view = frame.view;
-  const std::optional<MotionPrediction> motion = PredictMotion(*view);
-  const Rigid3 last_from_current = motion ? motion->last_from_current : Rigid3::Identity();
-  const Rigid3 reference_from_current = last_->reference_from_camera * last_from_current;
-  const Rigid3 predicted = (WorldFromReference() * reference_from_current).Pose();
-  const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
-  FollowTries tries;
-  bool is_clear = false;
-  for (const double widening : {1.0, 2.0, 4.0}) {
-    is_clear = is_clear || TryAt(predicted, widening, prior ? &*prior : nullptr, view, tries);
-  }
-  if (!is_clear) {
-    TrackedFrame placed(view);
-    is_clear = Relocalize(placed) && TryAt(placed.world_from_camera, 1.0, nullptr, view, tries);
-  }
-  if (!is_clear) {
-    const std::optional<Rigid3> by_pair = PoseByPair(*view);
-    is_clear = by_pair && TryAt(*by_pair, 1.0, nullptr, view, tries);
-  }
-  if (tries.num_inliers < options_.min_last_matches / 2) return std::nullopt;
-  frame = std::move(*tries.best);
-  if (!is_clear) return StepKind::kDoubtful;
-  return tries.num_tries == 1 ? StepKind::kUsual : StepKind::kWide;
-}
-
-// How well a prior knows where the last frame's points are seen, by its translation; pixels.
-double MapTracker::SigmaInImage(const PosePrior& prior) const {
-  const double sigma = std::sqrt(prior.information.inverse().trace() / 3.0);
-  return last_->frame.view->calibration().fx_px * sigma / MedianDepth(last_->frame);
-}
-
-// Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
-bool MapTracker::TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, const Frame& view,
-                       FollowTries& tries) const {
-  ++tries.num_tries;
-  TrackedFrame frame(view);
-  frame.world_from_camera = world_from_camera;
-  const int num = MatchLast(last_->frame, widening * options_.matching.last_radius_px, options_.matching, frame);
-  if (num < options_.min_last_matches) return false;
-  const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
-  const double turn_rad = LogSO3(world_from_camera.rotation.conjugate() * frame.world_from_camera.rotation).norm();
-  if (num_inliers > tries.num_inliers) {
-    tries.num_inliers = num_inliers;
-    tries.best = std::move(frame);
-  }
-  if (num_inliers < options_.min_last_matches / 2) return false;
-  if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_->frame.NumPoints()) return true;
-  return prior != nullptr && turn_rad < kMaxTurnFromPrediction_rad && SigmaInImage(*prior) < kMaxPredictionSigma_px;
-}
-
-// Mono: where the last frame and this one by themselves show the camera.
-std::optional<Rigid3> MapTracker::PoseByPair(const FrameView& view) const {
-  if (view.baseline_m() > 0.0) return std::nullopt;
-  const std::optional<MotionPrediction> motion = PredictMotion(view);
-  std::optional<Eigen::Vector3d> expected;
-  if (motion) expected = WorldFromReference().scale * motion->last_from_current.translation;
-  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_->frame, view, expected, {});
-  return last_from_current ? std::optional(last_->frame.world_from_camera * *last_from_current) : std::nullopt;
-}
-
 // Where hardly a known point is left in view, the way on is what the last frame and this one show by themselves: both
 // become keyframes, and what they see is new.
-bool MapTracker::FollowPair(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
-  if (!last_ || !options_.makes_keyframes) return false;
-  const std::optional<Rigid3> world_from_camera = PoseByPair(*view);
+bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes) {
+  if (!options_.makes_keyframes) return false;
+  const std::optional<Rigid3> world_from_camera = search.PoseByPair();
   if (!world_from_camera) return false;
-  const double interval_s = SinceLast(*view);
+  const double interval_s = SinceLast(*search.view());
   if (!reference_frame_ || reference_frame_->view != last_->frame.view) {
     keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
   }
-  TrackedFrame frame(view);
+  TrackedFrame frame(search.view());
   frame.world_from_camera = *world_from_camera;
-  MatchLast(last_->frame, options_.matching.last_radius_px, options_.matching, frame);
-  OptimizeFrame(options_.pose, frame);  // leaves the points that agree with one another
+  MatchLast(last_->frame, options_.search.matching.last_radius_px, options_.search.matching, frame);
+  OptimizeFrame(options_.search.pose, frame);  // leaves the points that agree with one another
   frame.world_from_camera = *world_from_camera;
   const Rigid3 reference_from_camera = (WorldFromReference().Inverse() * frame.world_from_camera).Pose();
   const double sigma = kPairSigmaShare * reference_from_camera.translation.norm();
   const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
   if (interval_s > 0.0) motion_.Add(reference_from_camera, covariance, interval_s, true);
-  last_.emplace(Last{std::move(frame), reference_from_camera, StepEvidence::kWeak, covariance, std::nullopt,
-                     StepKind::kDoubtful});
+  last_.emplace(Last{std::move(frame), reference_from_camera, StepEvidence::kWeak, covariance, std::nullopt, true});
   AddScaleDrift(reference_from_camera);
   keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
   return true;
-}
-
-// Without a predicted pose: the points around the last frame, matched by descriptor alone.
-bool MapTracker::Relocalize(TrackedFrame& frame) const {
-  KnownPoints points = PointsAround(last_->frame);
-  for (const SeenPoint& point : last_->frame.points) {
-    if (point.valid()) points.emplace_back(point.id, point.landmark);
-  }
-  MatchAnywhere(points, options_.matching, frame);
-  std::vector<PointPixel> pairs;
-  for (int i = 0; i < frame.view->size(); ++i) {
-    if (!frame.points[Index(i)].valid()) continue;
-    const PixelObservation seen = frame.view->observation(i);
-    pairs.push_back({frame.points[Index(i)].landmark.position_in_world, seen.pixel_px, seen.sigma_px});
-  }
-  const auto seed = static_cast<uint64_t>(frame.view->features().frame.value);
-  const auto pose = EstimateAbsolutePose(frame.view->calibration(), pairs, seed, {});
-  if (!pose) return false;
-  frame.world_from_camera = pose->camera_from_world.Inverse();
-  return OptimizeFrame(options_.pose, frame) >= options_.min_last_matches / 2;
 }
 
 // The frame that asked, this one or one before, becomes the last that was tracked. False if the answer does not hold in
@@ -460,9 +364,10 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
       frame.points[Index(seen.keypoint)] = {{seen.landmark, {}, -1}, *landmark};
     }
   }
-  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalized_inliers / 2) return false;
-  MatchLocal(PointsAround(frame), options_.matching.local_radius_px, options_.matching, frame);
-  if (OptimizeFrame(options_.pose, frame) < options_.min_relocalized_inliers) return false;
+  if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers / 2) return false;
+  MatchLocal(LocalPoints(replica_, frame, options_.search.max_local_keyframes),
+             options_.search.matching.local_radius_px, options_.search.matching, frame);
+  if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
   reference_ = answer.reference;
   reference_frame_.reset();
   decision_.Restart(frame);
@@ -472,7 +377,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   return true;
 }
 
-void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, StepKind step) {
+void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wide_step) {
   const Sim3 reference_from_world = WorldFromReference().Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
@@ -489,7 +394,7 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, StepKind st
   const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
   LearnReadout(frame);
   lost_since_us_.reset();
-  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, step});
+  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, is_wide_step});
 }
 
 void MapTracker::LearnReadout(const TrackedFrame& frame) {
@@ -589,7 +494,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
-  reference_frame_ = frame;
+  if (frame.view->baseline_m() == 0.0) reference_frame_ = frame;
   camera_motion_at_reference_ = camera_motion_;
   ++next_keyframe_.value;
   if (last_) last_->reference_from_camera = Rigid3::Identity();
@@ -612,7 +517,7 @@ void MapTracker::AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe
 // Mono, after a wide step: until the mapper answers, what this keyframe and its reference see is known by them. At the
 // next step it may be all that is left in view.
 void MapTracker::AddPairPoints(TrackedFrame& frame, KeyframeObservation& keyframe, SentKeyframe& sent) const {
-  const bool is_wide = last_ && &last_->frame == &frame && last_->step != StepKind::kUsual;
+  const bool is_wide = last_ && &last_->frame == &frame && last_->is_wide_step;
   if (!is_wide || frame.view->baseline_m() > 0.0 || !reference_frame_ || sent.reference != reference_) return;
   const Sim3 world_from_reference = WorldFromReference();
   TrackedFrame other = *reference_frame_;

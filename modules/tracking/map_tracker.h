@@ -15,9 +15,9 @@
 
 #include "core/result.h"
 #include "geometry/pose_optimization.h"
-#include "matching/point_matching.h"
 #include "messages/loop_types.h"
 #include "messages/tracking_types.h"
+#include "tracking/frame_search.h"
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/map_replica.h"
@@ -29,15 +29,12 @@ namespace tessera {
 struct MapTrackerOptions {
   // Points far ahead have little parallax, but they last longest: less than the usual parallax will do for a start.
   InitializerOptions start{.two_view = {.min_points = 100, .min_parallax_rad = 0.005}};
-  MatchOptions matching;
+  FrameSearchOptions search;
   KeyframeDecisionOptions keyframes;
-  PoseOptimizationOptions pose;
   int min_start_points = 150;        // stereo, RGB-D: keypoints with depth that a first keyframe needs
-  int min_last_matches = 20;         // fewer from the last frame: look in wider windows
   int min_inliers = 25;              // points that a pose must agree with
   double min_share_of_last = 0.1;    // of the last frame's points: fewer from one frame to the next are there by chance
   int min_relocalized_inliers = 50;  // likewise after a loss, where chance has more room
-  int max_local_keyframes = 30;      // whose landmarks are looked for
   int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
   bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
   int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
@@ -88,10 +85,6 @@ class MapTracker {
   State state() const;
   bool has_map() const { return replica_.map().keyframes().size() > 0; }
 
-  // How a frame was found from the last one: where the motion led, only elsewhere or in a wide window (a wide step), or
-  // by so few of the last frame's points that it takes a look at what should be seen, too.
-  enum class StepKind { kUsual, kWide, kDoubtful };
-
   // What is remembered of the last tracked frame.
   struct Last {
     TrackedFrame frame;
@@ -99,7 +92,7 @@ class MapTracker {
     StepEvidence evidence = StepEvidence::kStrong;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    // of the camera's center, in its axes and those units
     std::optional<CameraMotion> mean_motion = std::nullopt;  // since the frame before, in units of the world
-    StepKind step = StepKind::kUsual;
+    bool is_wide_step = false;                               // FoundFrame::is_wide
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -111,13 +104,6 @@ class MapTracker {
   struct MotionAt {
     MotionModel model;
     int64_t utime_us = 0;
-  };
-
-  // The best of several tries to find a frame from the last one.
-  struct FollowTries {
-    std::optional<TrackedFrame> best;
-    int num_inliers = 0;  // of the best
-    int num_tries = 0;
   };
 
   struct FramePose {
@@ -133,7 +119,9 @@ class MapTracker {
   void UpdateLast();
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
-  bool Localize(const Frame& view);
+  ExpectedFrame Expect(const FrameView& view) const;
+  FrameSearch SearchFor(const Frame& view) const;
+  bool Localize(const Frame& view, FrameSearch& search);
   std::optional<CameraMotion> MeanMotionOf(const TrackedFrame& frame) const;
   std::optional<CameraMotion> MotionOf(const TrackedFrame& frame) const;
   Frame Unrolled(const Frame& rolled, const TrackedFrame& frame, const std::optional<CameraMotion>& motion) const;
@@ -147,16 +135,9 @@ class MapTracker {
   std::optional<Drift> DriftNow() const;
   void TakeOverMotion(MonoStart& start);
   void AddScaleDrift(const Rigid3& reference_from_camera);
-  std::optional<StepKind> FollowLast(TrackedFrame& frame) const;
-  double SigmaInImage(const PosePrior& prior) const;
-  bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, const Frame& view,
-             FollowTries& tries) const;
-  std::optional<Rigid3> PoseByPair(const FrameView& view) const;
-  bool FollowPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
-  bool Relocalize(TrackedFrame& frame) const;
-  KnownPoints PointsAround(const TrackedFrame& frame) const;
-  void Remember(TrackedFrame frame, const FramePose& pose, StepKind step);
+  void Remember(TrackedFrame frame, const FramePose& pose, bool is_wide_step);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
@@ -175,11 +156,12 @@ class MapTracker {
   std::optional<CameraMotion> camera_motion_at_reference_;  // likewise
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
-  std::optional<TrackedFrame> reference_frame_;  // as it was when it became a keyframe; nullopt: it is the map's alone
-  Rigid3 world_from_start_;                      // camera where the next part of the map begins
-  std::optional<Drift> drift_;                   // of the last loss
-  double scale_variance_ = 0.0;                  // of the logarithm of the scale
-  int64_t previous_utime_us_ = 0;                // of the frame before
+  std::optional<TrackedFrame>
+      reference_frame_;            // mono: as it was when it became a keyframe; nullopt: it is the map's alone
+  Rigid3 world_from_start_;        // camera where the next part of the map begins
+  std::optional<Drift> drift_;     // of the last loss
+  double scale_variance_ = 0.0;    // of the logarithm of the scale
+  int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last
 };

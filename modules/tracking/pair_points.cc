@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
+#include "core/quantile.h"
 #include "matching/epipolar_search.h"
 #include "measurement/landmark_description.h"
 
@@ -21,9 +23,7 @@ double MinDepth(const TrackedFrame& frame, double step) {
     depths.push_back((camera_from_world * point.landmark.position_in_world).z());
   }
   if (depths.size() < kMinDepths) return 0.5 * step;
-  const auto near = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 20);
-  std::nth_element(depths.begin(), near, depths.end());
-  return *near / 3.0;
+  return OrderStatistic(std::move(depths), 0.05) / 3.0;
 }
 
 // By keypoint: whether it sees a known point.

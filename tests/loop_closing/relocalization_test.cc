@@ -70,7 +70,7 @@ constexpr int64_t kFar = 44;  // steps: from there, nothing of the beginning is 
 // The map is so small that a tracker knows nearly all of it as what is around the last frame; this one looks less far.
 MapTrackerOptions ShortSighted() {
   MapTrackerOptions options;
-  options.max_local_keyframes = 2;
+  options.search.max_local_keyframes = 2;
   return options;
 }
 

@@ -1,0 +1,113 @@
+#include "tracking/frame_search.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "geometry/absolute_pose.h"
+#include "matching/frame_pose.h"
+#include "tracking/local_points.h"
+#include "tracking/pair_motion.h"
+
+namespace tessera {
+namespace {
+
+// A try to follow the last frame has found the true pose if these shares of the matches, and of the last frame's
+// points, agree with it. At usual steps 0.77 and 0.44 is the least that was seen (KITTI 03); walls and fences seen one
+// window too far gave up to 0.66 and 0.37.
+constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
+// Or if a steady motion knew, to this standard deviation, where points are seen, and the camera turned as predicted. In
+// the open, where points fade from frame to frame, no other try is better.
+constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
+
+}  // namespace
+
+Result<> FrameSearchOptions::Check() const {
+  TESSERA_RETURN_IF_FAILED(matching.Check());
+  return Require(max_local_keyframes >= 1, "max_local_keyframes must be at least 1");
+}
+
+FrameSearch::FrameSearch(Frame view, const TrackedFrame& last, const ExpectedFrame& expected, const MapReplica& replica,
+                         const FrameSearchOptions& options)
+    : view_(std::move(view)), last_(last), expected_(expected), replica_(replica), options_(options) {}
+
+std::optional<FoundFrame> FrameSearch::Follow() {
+  Best best;
+  bool is_clear = false;
+  for (const double widening : {1.0, 2.0, 4.0}) {
+    const PosePrior* prior = expected_.prior ? &*expected_.prior : nullptr;
+    is_clear = is_clear || TryAt(expected_.world_from_camera, widening, prior, best);
+  }
+  if (!is_clear) {
+    const std::optional<FoundFrame>& found = FindAnywhere();
+    is_clear = found && TryAt(found->frame.world_from_camera, 1.0, nullptr, best);
+  }
+  if (!is_clear) is_clear = PoseByPair() && TryAt(*PoseByPair(), 1.0, nullptr, best);
+  if (best.num_inliers < options_.min_last_matches / 2) return std::nullopt;
+  const bool is_wide = !is_clear || best.num_tries > 1;
+  return FoundFrame{std::move(*best.frame), is_wide, !is_clear};
+}
+
+const std::optional<FoundFrame>& FrameSearch::FindAnywhere() {
+  if (!anywhere_) anywhere_ = SearchAnywhere();
+  return *anywhere_;
+}
+
+const std::optional<Rigid3>& FrameSearch::PoseByPair() {
+  if (!by_pair_) by_pair_ = SearchByPair();
+  return *by_pair_;
+}
+
+// Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
+bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const {
+  ++best.num_tries;
+  TrackedFrame frame(view_);
+  frame.world_from_camera = world_from_camera;
+  const int num = MatchLast(last_, widening * options_.matching.last_radius_px, options_.matching, frame);
+  if (num < options_.min_last_matches) return false;
+  const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
+  const double turn_rad = LogSO3(world_from_camera.rotation.conjugate() * frame.world_from_camera.rotation).norm();
+  if (num_inliers > best.num_inliers) {
+    best.num_inliers = num_inliers;
+    best.frame = std::move(frame);
+  }
+  if (num_inliers < options_.min_last_matches / 2) return false;
+  if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_.NumPoints()) return true;
+  return prior != nullptr && turn_rad < kMaxTurnFromPrediction_rad && PriorSigma_px(*prior) < kMaxPriorSigma_px;
+}
+
+// How well a prior knows where the last frame's points are seen, by its translation.
+double FrameSearch::PriorSigma_px(const PosePrior& prior) const {
+  const double sigma = std::sqrt(prior.information.inverse().trace() / 3.0);
+  return view_->calibration().fx_px * sigma / last_.MedianDepth();
+}
+
+std::optional<Rigid3> FrameSearch::SearchByPair() const {
+  if (view_->baseline_m() > 0.0) return std::nullopt;
+  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.step, {});
+  return last_from_current ? std::optional(last_.world_from_camera * *last_from_current) : std::nullopt;
+}
+
+std::optional<FoundFrame> FrameSearch::SearchAnywhere() const {
+  KnownPoints points = LocalPoints(replica_, last_, options_.max_local_keyframes);
+  for (const SeenPoint& point : last_.points) {
+    if (point.valid()) points.emplace_back(point.id, point.landmark);
+  }
+  TrackedFrame frame(view_);
+  MatchAnywhere(points, options_.matching, frame);
+  std::vector<PointPixel> pairs;
+  for (int i = 0; i < frame.view->size(); ++i) {
+    if (!frame.points[Index(i)].valid()) continue;
+    const PixelObservation seen = frame.view->observation(i);
+    pairs.push_back({frame.points[Index(i)].landmark.position_in_world, seen.pixel_px, seen.sigma_px});
+  }
+  const auto seed = static_cast<uint64_t>(frame.view->features().frame.value);
+  const auto pose = EstimateAbsolutePose(frame.view->calibration(), pairs, seed, {});
+  if (!pose) return std::nullopt;
+  frame.world_from_camera = pose->camera_from_world.Inverse();
+  if (OptimizeFrame(options_.pose, frame) < options_.min_last_matches / 2) return std::nullopt;
+  return FoundFrame{std::move(frame), true, true};
+}
+
+}  // namespace tessera

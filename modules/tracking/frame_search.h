@@ -1,0 +1,78 @@
+// One frame's search for its pose, from the last frame that was tracked.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "geometry/pose_optimization.h"
+#include "matching/point_matching.h"
+#include "tracking/map_replica.h"
+
+namespace tessera {
+
+struct FrameSearchOptions {
+  MatchOptions matching;
+  PoseOptimizationOptions pose;
+  int min_last_matches = 20;     // fewer from the last frame: look in wider windows
+  int max_local_keyframes = 30;  // whose landmarks are looked for
+
+  Result<> Check() const;
+};
+
+// What the motion so far says of a frame.
+struct ExpectedFrame {
+  Rigid3 world_from_camera;
+  std::optional<Eigen::Vector3d> step;  // in the last camera's axes, world units; nullopt: no motion is known
+  std::optional<PosePrior> prior;       // how well that is known, if the motion was steady
+};
+
+struct FoundFrame {
+  TrackedFrame frame;
+  // It was found only elsewhere than expected or in a wide window.
+  bool is_wide = false;
+  // So few of the last frame's points agree that a look at what should be seen, too, must confirm the pose.
+  bool is_doubtful = false;
+};
+
+class FrameSearch {
+ public:
+  using Frame = std::shared_ptr<const FrameView>;
+
+  // `last`, `replica` and `options` must outlive the search.
+  FrameSearch(Frame view, const TrackedFrame& last, const ExpectedFrame& expected, const MapReplica& replica,
+              const FrameSearchOptions& options);
+
+  const Frame& view() const { return view_; }
+
+  // The last frame's points, in windows around where the motion leads, ever wider; then from where the points around
+  // the last frame are found by descriptor alone, and from how the two frames as such show the motion. The first clear
+  // try ends it, else the best one counts, if any has enough inliers.
+  std::optional<FoundFrame> Follow();
+  // Without an expected pose: the points around the last frame, matched by descriptor alone. Computed once.
+  const std::optional<FoundFrame>& FindAnywhere();
+  // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
+  const std::optional<Rigid3>& PoseByPair();
+
+ private:
+  // The best of several tries.
+  struct Best {
+    std::optional<TrackedFrame> frame;
+    int num_inliers = 0;
+    int num_tries = 0;
+  };
+
+  std::optional<FoundFrame> SearchAnywhere() const;
+  std::optional<Rigid3> SearchByPair() const;
+  bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
+  double PriorSigma_px(const PosePrior& prior) const;
+
+  const Frame view_;
+  const TrackedFrame& last_;
+  const ExpectedFrame expected_;
+  const MapReplica& replica_;
+  const FrameSearchOptions& options_;
+  std::optional<std::optional<FoundFrame>> anywhere_;
+  std::optional<std::optional<Rigid3>> by_pair_;
+};
+
+}  // namespace tessera

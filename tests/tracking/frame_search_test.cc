@@ -1,0 +1,95 @@
+// The search for a frame from the last one, on the synthetic world.
+#include "tracking/frame_search.h"
+
+#include <gtest/gtest.h>
+
+#include "support/matchers.h"
+#include "support/synthetic_world.h"
+
+namespace tessera {
+namespace {
+
+// Replaces the descriptors of all but every n-th keypoint by others.
+FeatureFrame Faded(FeatureFrame features, size_t n) {
+  for (size_t i = 0; i < features.descriptors.size(); ++i) {
+    if (i % n == 0) continue;
+    for (uint64_t& word : features.descriptors[i]) word = ~word;
+  }
+  return features;
+}
+
+class FrameSearchTest : public testing::Test {
+ protected:
+  std::optional<FoundFrame> Follow(const FeatureFrame& features, const ExpectedFrame& expected) const {
+    return FrameSearch(ViewOf(features), last_, expected, replica_, options_).Follow();
+  }
+  FeatureFrame Take() { return world_.Take(1, truth_).features; }
+
+  SyntheticWorld world_{SensorType::kMono, 0.3};
+  const TrackedFrame last_ = world_.TrackedAt(0);
+  const Rigid3 truth_ = SyntheticWorld::Pose(1.0);
+  const FrameSearchOptions options_;
+  const MapReplica replica_;
+};
+
+TEST_F(FrameSearchTest, FindsAFrameWhereItIsExpected) {
+  const auto found = Follow(Take(), {.world_from_camera = truth_});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_THAT(found->frame.world_from_camera, IsNear(truth_, 0.02));
+  EXPECT_FALSE(found->is_wide);
+  EXPECT_FALSE(found->is_doubtful);
+}
+
+TEST_F(FrameSearchTest, SaysThatItIsFarFromWhereItIsExpected) {
+  const Rigid3 turned = truth_ * Rigid3{ExpSO3({0.0, 0.3, 0.0}), Eigen::Vector3d::Zero()};
+  const auto found = Follow(Take(), {.world_from_camera = turned});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_THAT(found->frame.world_from_camera, IsNear(truth_, 0.02));
+  EXPECT_TRUE(found->is_wide);
+}
+
+TEST_F(FrameSearchTest, DoubtsAFrameThatSeesFewOfTheLastPoints) {
+  const auto found = Follow(Faded(Take(), 6), {.world_from_camera = truth_});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_THAT(found->frame.world_from_camera, IsNear(truth_, 0.05));
+  EXPECT_TRUE(found->is_doubtful);
+}
+
+TEST_F(FrameSearchTest, BelievesASteadyMotionThatFewPointsAgreeWith) {
+  const double sigma_m = 0.005;
+  const PosePrior prior{truth_.Inverse(), Eigen::Matrix3d::Identity() / (sigma_m * sigma_m)};
+  const auto found = Follow(Faded(Take(), 6), {.world_from_camera = truth_, .prior = prior});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_FALSE(found->is_doubtful);
+}
+
+TEST_F(FrameSearchTest, FindsNothingWhereNothingIsSeenAgain) {
+  const FeatureFrame strange = Faded(Take(), 1000000);
+  EXPECT_FALSE(Follow(strange, {.world_from_camera = truth_}).has_value());
+}
+
+TEST_F(FrameSearchTest, FindsAFrameAnywhereByDescriptorsAlone) {
+  FrameSearch search(ViewOf(Take()), last_, {.world_from_camera = Rigid3{ExpSO3({0.0, 2.0, 0.0}), {9.0, 0.0, 0.0}}},
+                     replica_, options_);
+  ASSERT_TRUE(search.FindAnywhere().has_value());
+  EXPECT_THAT(search.FindAnywhere()->frame.world_from_camera, IsNear(truth_, 0.02));
+}
+
+TEST_F(FrameSearchTest, OnlyMonoAsksTwoFramesByThemselves) {
+  FrameSearch mono(ViewOf(Take()), last_, {.world_from_camera = truth_}, replica_, options_);
+  ASSERT_TRUE(mono.PoseByPair().has_value());
+  EXPECT_THAT(*mono.PoseByPair(), IsNear(truth_, 0.1));
+  SyntheticWorld stereo_world(SensorType::kStereo, 0.3);
+  const TrackedFrame stereo_last = stereo_world.TrackedAt(0);
+  FrameSearch stereo(ViewOf(stereo_world.Take(1).features), stereo_last, {.world_from_camera = truth_}, replica_,
+                     options_);
+  EXPECT_FALSE(stereo.PoseByPair().has_value());
+}
+
+TEST(FrameSearchOptions, AreChecked) {
+  EXPECT_THAT(FrameSearchOptions{}.Check(), IsSuccess());
+  EXPECT_THAT(FrameSearchOptions{.max_local_keyframes = 0}.Check(), IsFailure(HasSubstr("max_local_keyframes")));
+}
+
+}  // namespace
+}  // namespace tessera
