@@ -3,8 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include "core/quantile.h"
 #include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
 #include "tracking/local_points.h"
@@ -45,7 +47,7 @@ std::optional<FoundFrame> FrameSearch::Follow() {
   }
   if (!is_clear) is_clear = PoseByPair() && TryAt(*PoseByPair(), 1.0, nullptr, best);
   if (best.num_inliers < options_.min_last_matches / 2) return std::nullopt;
-  const bool is_wide = !is_clear || best.num_tries > 1;
+  const bool is_wide = (is_clear && best.num_tries > 1) || IsWide(*best.frame);
   return FoundFrame{std::move(*best.frame), is_wide, !is_clear};
 }
 
@@ -83,6 +85,21 @@ double FrameSearch::PriorSigma_px(const PosePrior& prior) const {
   return view_->calibration().fx_px * sigma / last_.MedianDepth();
 }
 
+bool FrameSearch::IsWide(const TrackedFrame& frame) const {
+  const Rigid3 camera_from_world = expected_.world_from_camera.Inverse();
+  std::vector<double> distances_px;
+  for (int i = 0; i < frame.view->size(); ++i) {
+    const SeenPoint& point = frame.points[Index(i)];
+    if (!point.valid()) continue;
+    const Eigen::Vector3d in_camera = camera_from_world * point.landmark.position_in_world;
+    distances_px.push_back(
+        in_camera.z() > 0.0
+            ? (frame.view->calibration().Project(in_camera) - frame.view->observation(i).pixel_px).norm()
+            : std::numeric_limits<double>::infinity());
+  }
+  return OrderStatistic(std::move(distances_px), 0.5) > options_.matching.last_radius_px;
+}
+
 std::optional<Rigid3> FrameSearch::SearchByPair() const {
   if (view_->baseline_m() > 0.0) return std::nullopt;
   const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.step, {});
@@ -107,7 +124,8 @@ std::optional<FoundFrame> FrameSearch::SearchAnywhere() const {
   if (!pose) return std::nullopt;
   frame.world_from_camera = pose->camera_from_world.Inverse();
   if (OptimizeFrame(options_.pose, frame) < options_.min_last_matches / 2) return std::nullopt;
-  return FoundFrame{std::move(frame), true, true};
+  const bool is_wide = IsWide(frame);
+  return FoundFrame{std::move(frame), is_wide, true};
 }
 
 }  // namespace tessera

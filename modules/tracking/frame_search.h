@@ -28,7 +28,8 @@ struct ExpectedFrame {
 
 struct FoundFrame {
   TrackedFrame frame;
-  // It was found only elsewhere than expected or in a wide window.
+  // It was found only in a wider window, or elsewhere than expected: half of its points lie outside the usual window
+  // around where they should be.
   bool is_wide = false;
   // So few of the last frame's points agree that a look at what should be seen, too, must confirm the pose.
   bool is_doubtful = false;
@@ -65,6 +66,7 @@ class FrameSearch {
   std::optional<Rigid3> SearchByPair() const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
   double PriorSigma_px(const PosePrior& prior) const;
+  bool IsWide(const TrackedFrame& frame) const;
 
   const Frame view_;
   const TrackedFrame& last_;

@@ -48,10 +48,11 @@ TEST_F(FrameSearchTest, SaysThatItIsFarFromWhereItIsExpected) {
   EXPECT_TRUE(found->is_wide);
 }
 
-TEST_F(FrameSearchTest, DoubtsAFrameThatSeesFewOfTheLastPoints) {
+TEST_F(FrameSearchTest, DoubtsAFrameThatSeesFewOfTheLastPointsButDoesNotCallItWide) {
   const auto found = Follow(Faded(Take(), 6), {.world_from_camera = truth_});
   ASSERT_TRUE(found.has_value());
   EXPECT_THAT(found->frame.world_from_camera, IsNear(truth_, 0.05));
+  EXPECT_FALSE(found->is_wide);
   EXPECT_TRUE(found->is_doubtful);
 }
 
