@@ -23,7 +23,7 @@ COVERED_BY_OTHERS = {
     "optimization/bundle_solver.h": "inside of bundle_adjustment_test",
     "optimization/bundle_summary.h": "a value; bundle_adjustment_test",
     "optimization/ceres_options.h": "constants",
-    "optimization/window_solver.h": "bundle_adjustment_test compares it with Ceres",
+    "optimization/schur_solver.h": "bundle_adjustment_test compares it with Ceres",
     "runtime/clock.h": "an interface; the memory bus of the tests implements it",
     "runtime/incoming_streams.h": "inside of memory_bus_test",
     "runtime/map_subscription.h": "mapping_pipeline_test and revival_test follow the map by it",

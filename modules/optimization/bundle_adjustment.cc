@@ -7,10 +7,13 @@
 
 #include "optimization/bundle_costs.h"
 #include "optimization/bundle_solver.h"
-#include "optimization/window_solver.h"
+#include "optimization/schur_solver.h"
 
 namespace tessera {
 namespace {
+
+// Of rounds before the last, where slow modes are left to that one.
+constexpr double kCoarseTolerance = 1e-3;
 
 bool IsIndex(int index, size_t size) { return index >= 0 && static_cast<size_t>(index) < size; }
 
@@ -149,7 +152,9 @@ std::optional<BundleResult> AdjustInRounds(const BundleProblem& problem, const B
   BundleResult result;
   std::vector<char> takes_part = InFront(problem);
   for (int round = 0; round < options.num_rounds; ++round) {
-    const std::optional<BundleSummary> summary = solver.Solve(takes_part);
+    const bool is_coarse = options.has_slow_modes && round + 1 < options.num_rounds;
+    const std::optional<BundleSummary> summary =
+        solver.Solve(takes_part, is_coarse ? kCoarseTolerance : options.function_tolerance);
     if (!summary) {
       return std::nullopt;
     }
@@ -158,7 +163,7 @@ std::optional<BundleResult> AdjustInRounds(const BundleProblem& problem, const B
     result.num_iterations += summary->num_iterations;
     solver.WriteBack(result);
     result.is_inlier = Classify(problem, result);
-    if (result.is_inlier == takes_part) {
+    if (result.is_inlier == takes_part && !is_coarse) {
       break;
     }
     takes_part = result.is_inlier;
@@ -201,7 +206,11 @@ Result<> BundleOptions::Check() const {
 }
 
 BundleOptions GlobalBundleOptions() {
-  return {.max_num_iterations = 12, .num_rounds = 2, .function_tolerance = 1e-6, .initial_radius = 1e5};
+  return {.max_num_iterations = 20,
+          .num_rounds = 2,
+          .function_tolerance = 1e-7,
+          .initial_radius = 1e5,
+          .has_slow_modes = true};
 }
 
 std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const BundleOptions& options) {
@@ -210,10 +219,8 @@ std::optional<BundleResult> AdjustBundle(const BundleProblem& problem, const Bun
   if (!IsFinite(problem)) {
     return std::nullopt;
   }
-  const int num_free = static_cast<int>(problem.poses.size()) - problem.num_fixed_poses();
-  const bool is_window = num_free <= options.max_num_dense_poses && !options.is_always_ceres;
-  std::optional<BundleResult> result =
-      is_window ? AdjustInRounds<WindowSolver>(problem, options) : AdjustInRounds<BundleSolver>(problem, options);
+  std::optional<BundleResult> result = options.is_always_ceres ? AdjustInRounds<BundleSolver>(problem, options)
+                                                               : AdjustInRounds<SchurSolver>(problem, options);
   if (!result) {
     return std::nullopt;
   }

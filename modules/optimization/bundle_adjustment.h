@@ -63,19 +63,22 @@ struct BundleOptions {
   // Of the trust region at the start of a round, as Ceres has it: damping is the curvature's diagonal over this. The
   // slow modes of a long street have a curvature far below the diagonal: where they must move, begin with less damping.
   double initial_radius = 1e4;
+  // The curvature of a large map is that of a long, curved valley. After each step the points follow the poses by
+  // themselves, steps may climb for a moment, and the trust region grows fast and is kept from round to round
+  // (README.md has the measurements); only the last round goes on to function_tolerance.
+  bool has_slow_modes = false;
   // Up to this many free poses the reduced camera system is solved dense, above it sparse. Dense is the
   // faster for a local window, where nearly every keyframe shares landmarks with every other.
   int max_num_dense_poses = 60;
-  // Solve dense systems with Ceres too, instead of WindowSolver, which finds the same minimum in a fraction of the
-  // time.
+  // Solve with Ceres, for comparison: SchurSolver finds the same minimum in a fraction of the time.
   bool is_always_ceres = false;
 
   // Fails if a value is out of range.
   Result<> Check() const;
 };
 
-// For a whole map after a loop was closed (README.md has the measurements): little damping, and steps that gain little
-// are worth taking: a street may move by meters for a millionth of the cost.
+// For a whole map after a loop was closed: little damping, and steps that gain little are worth taking: a street may
+// move by meters for a millionth of the cost.
 BundleOptions GlobalBundleOptions();
 
 struct BundleResult {
@@ -88,8 +91,7 @@ struct BundleResult {
   int num_iterations = 0;     // of all rounds
 };
 
-// Minimizes over the free camera_from_world and all points, by Levenberg-Marquardt with the points eliminated (Schur):
-// in Ceres, but for local windows (BundleOptions),
+// Minimizes over the free camera_from_world and all points, by Levenberg-Marquardt with the points eliminated (Schur),
 //
 //   1/2 sum_obs rho(|e|^2) + 1/2 sum_constraints r' information r
 //

@@ -133,7 +133,7 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleSolver::Ordering() {
   return ordering;
 }
 
-std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_part) {
+std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_part, double function_tolerance) {
   MarkUsed(takes_part);
   int num_free_poses = 0;
   for (size_t i = 0; i < poses_.size(); ++i) {
@@ -147,7 +147,7 @@ std::optional<BundleSummary> BundleSolver::Solve(const std::vector<char>& takes_
   AddParameters(ceres_problem);
   AddResiduals(takes_part, ceres_problem);
 
-  ceres::Solver::Options options = CeresSolverOptions(options_.max_num_iterations, options_.function_tolerance);
+  ceres::Solver::Options options = CeresSolverOptions(options_.max_num_iterations, function_tolerance);
   options.linear_solver_type =
       num_free_poses <= options_.max_num_dense_poses ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   options.linear_solver_ordering = Ordering();

@@ -22,8 +22,9 @@ class BundleSolver {
   BundleSolver(const BundleProblem& problem, const BundleOptions& options);
 
   // One robust least-squares solve over the constraints and the observations with takes_part[i] != 0, from where the
-  // last one ended. nullopt: nothing free takes part, or Ceres failed; the state is then unspecified.
-  std::optional<BundleSummary> Solve(const std::vector<char>& takes_part);
+  // last one ended. It ends when a step lowers the cost by less than `function_tolerance` of it. nullopt: nothing free
+  // takes part, or Ceres failed; the state is then unspecified.
+  std::optional<BundleSummary> Solve(const std::vector<char>& takes_part, double function_tolerance);
 
   // The poses and points as they are now.
   void WriteBack(BundleResult& result) const;

@@ -71,19 +71,21 @@ TEST(AdjustBundle, RecoversStructureAloneWhenAllPosesAreFixed) {
 TEST(AdjustBundle, AllSolversGiveTheSame) {
   for (const double share : {0.0, 0.5}) {
     const SyntheticBundle bundle = MakeSyntheticBundle({.share_with_right = share, .pixel_noise_px = 0.5});
-    BundleOptions sparse = Exhaustive(), ceres = Exhaustive();
+    BundleOptions sparse = Exhaustive(), ceres = Exhaustive(), slow = Exhaustive();
     sparse.max_num_dense_poses = 0;
     ceres.is_always_ceres = true;
+    slow.has_slow_modes = true;
     const auto a = AdjustBundle(bundle.problem, Exhaustive()), b = AdjustBundle(bundle.problem, sparse);
-    const auto c = AdjustBundle(bundle.problem, ceres);
-    ASSERT_TRUE(a && b && c);
+    const auto c = AdjustBundle(bundle.problem, ceres), d = AdjustBundle(bundle.problem, slow);
+    ASSERT_TRUE(a && b && c && d);
     EXPECT_LT(MaxPoseError(*a, b->camera_from_world), 1e-7);
     EXPECT_LT(MaxPoseError(*a, c->camera_from_world), 1e-7);
+    EXPECT_LT(MaxPoseError(*a, d->camera_from_world), 1e-7);
     EXPECT_EQ(a->is_inlier, b->is_inlier);
   }
 }
 
-// One round of WindowSolver or of Ceres, as far as `max_num_iterations` go.
+// One round of SchurSolver or of Ceres, as far as `max_num_iterations` go.
 BundleResult AfterIterations(const BundleProblem& problem, int max_num_iterations, bool is_ceres) {
   BundleOptions options;
   options.function_tolerance = 0.0;
@@ -104,10 +106,10 @@ SyntheticBundle MakeFarBundle(double share_with_right) {
                               .depth_range_m = 106.0});
 }
 
-// WindowSolver damps points otherwise than Ceres and moves them by inverse depth, so it takes other steps; outliers and
+// SchurSolver damps points otherwise than Ceres and moves them by inverse depth, so it takes other steps; outliers and
 // constraints included, these lead to the same minimum. (From farther away they need not: then Ceres sometimes leaves a
 // point behind a camera.)
-TEST(AdjustBundle, WindowSolverEndsAtTheMinimumOfCeres) {
+TEST(AdjustBundle, SchurSolverEndsAtTheMinimumOfCeres) {
   const SyntheticBundleOptions near{.pixel_noise_px = 1.0};
   SyntheticBundleOptions mixed = near, stereo = near;
   mixed.share_with_right = 0.5;
@@ -136,7 +138,7 @@ TEST(AdjustBundle, WindowSolverEndsAtTheMinimumOfCeres) {
 
 // Damping by the world's axes holds a far point's depth as firmly as its direction, which is known a thousand times
 // better; and distances, unlike inverse ones, are not linear in what is seen.
-TEST(AdjustBundle, WindowSolverPlacesFarPointsInFewIterations) {
+TEST(AdjustBundle, SchurSolverPlacesFarPointsInFewIterations) {
   for (const double share_with_right : {0.0, 1.0}) {
     const BundleProblem problem = MakeFarBundle(share_with_right).problem;
     const double minimum = AfterIterations(problem, 200, true).final_cost;
@@ -170,6 +172,22 @@ TEST(AdjustBundle, StraightensAStreetAfterItsLoop) {
   ASSERT_TRUE(result && limit);
   EXPECT_LT(rms(result->camera_from_world), 0.3 * rms(start));
   EXPECT_LT(rms(result->camera_from_world), 1.3 * rms(limit->camera_from_world));
+}
+
+// To half a unit of chi-square, which says nothing any more, where thousands of observations hold few modes.
+TEST(AdjustBundle, AWholeStreetEndsAtItsMinimum) {
+  for (const double share : {0.0, 0.7}) {
+    const SyntheticBundle bundle =
+        MakeSyntheticStreet({.num_keyframes = 300, .num_new_landmarks = 20, .share_with_right = share});
+    BundleOptions exhaustive = GlobalBundleOptions();
+    exhaustive.max_num_iterations = 100;
+    exhaustive.function_tolerance = 0.0;
+    const auto result = AdjustBundle(bundle.problem, GlobalBundleOptions());
+    const auto limit = AdjustBundle(bundle.problem, exhaustive);
+    ASSERT_TRUE(result && limit);
+    EXPECT_LT(result->final_cost, limit->final_cost + 0.5);
+    EXPECT_LT(result->num_iterations, 25);
+  }
 }
 
 TEST(AdjustBundle, TwoViewsKeepTheFirstPoseAndTheDistanceToTheSecond) {
