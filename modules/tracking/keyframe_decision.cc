@@ -18,7 +18,7 @@ bool IsKnown(const SeenPoint& point, const TrackedFrame& frame) {
 }  // namespace
 
 Result<> KeyframeDecisionOptions::Check() const {
-  for (const double share : {min_share, min_first_share, min_still_share}) {
+  for (const double share : {min_share, min_share_with_depth, min_first_share, min_still_share}) {
     if (!(share > 0.0 && share < 1.0)) return Failed("the shares of a reference's points must be between 0 and 1");
   }
   if (!(max_turn_share > 0.0)) return Failed("max_turn_share must be positive");
@@ -87,8 +87,9 @@ bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_
     first_utime_us_ = utime_us;
     points_ = std::move(seen.points);
   }
+  const double min_share = frame.view->baseline_m() > 0.0 ? options_.min_share_with_depth : options_.min_share;
   const bool has_lost_sight =
-      is_first ? share < options_.min_first_share : NextShare(share, utime_us, frame_interval_us) < options_.min_share;
+      is_first ? share < options_.min_first_share : NextShare(share, utime_us, frame_interval_us) < min_share;
   const bool lacks_near = near.num_known < options_.max_known_points && near.num_new > options_.min_new_points;
   const bool has_moved = share < options_.min_still_share;
   const bool is_old = utime_us - utime_us_ > options_.max_interval_us;
