@@ -71,6 +71,7 @@ constexpr int64_t kFar = 44;  // steps: from there, nothing of the beginning is 
 MapTrackerOptions ShortSighted() {
   MapTrackerOptions options;
   options.search.max_local_keyframes = 2;
+  options.keyframes.min_share_with_depth = 0.75;  // and these are near one another
   return options;
 }
 
