@@ -49,7 +49,7 @@ using LinkIndex = std::map<std::pair<KeyframeId, KeyframeId>, size_t>;  // by ol
 // Adds what the landmark contributes to every link between two of its observers.
 void AddLandmark(const Map& map, LandmarkId id, const LinkIndex& index_of, std::vector<Matrix7>& information) {
   const Eigen::Vector3d& position = map.FindLandmark(id)->position_in_world;
-  const std::vector<Observation>& seen = map.ObservationsOf(id);
+  const std::span<const Observation> seen = map.ObservationsOf(id);
   std::vector<Eigen::Matrix3d> up_to(seen.size()), from;
   for (size_t i = 0; i < seen.size(); ++i) {
     up_to[i] = PositionInformation(*map.FindKeyframe(seen[i].keyframe), seen[i].keypoint, position);

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "core/id_set.h"
 #include "map/neighborhood.h"
 
 namespace tessera {
@@ -47,12 +48,15 @@ std::vector<Group> RankGroups(const Map& map, const std::vector<PlaceDatabase::P
 }
 
 // The keyframe, its neighbors and theirs.
-std::set<KeyframeId> Connected(const Map& map, KeyframeId id, int min_shared) {
-  std::set<KeyframeId> connected{id};
-  const auto num_all = static_cast<int>(map.keyframes().size());
-  for (const KeyframeId neighbor : map.Covisible(id, num_all, min_shared)) {
-    connected.insert(neighbor);
-    for (const KeyframeId second : map.Covisible(neighbor, num_all, min_shared)) connected.insert(second);
+IdSet<KeyframeId> Connected(const Map& map, KeyframeId id, int min_shared) {
+  IdSet<KeyframeId> connected(map.keyframes().end_id());
+  connected.Add(id);
+  for (const auto& [neighbor, num_shared] : map.FindKeyframe(id)->covisible) {
+    if (num_shared < min_shared) continue;
+    connected.Add(neighbor);
+    for (const auto& [second, num_with_second] : map.FindKeyframe(neighbor)->covisible) {
+      if (num_with_second >= min_shared) connected.Add(second);
+    }
   }
   return connected;
 }
@@ -72,9 +76,9 @@ std::vector<Group> FindGroups(const Map& map, const PlaceDatabase& places, Keyfr
                               const CandidateOptions& options) {
   const BagOfWords* bag = places.Find(id);
   if (bag == nullptr) return {};
-  const std::set<KeyframeId> connected = Connected(map, id, options.min_shared_landmarks);
+  const IdSet<KeyframeId> connected = Connected(map, id, options.min_shared_landmarks);
   std::vector<PlaceDatabase::Place> found =
-      places.Query(*bag, [&](KeyframeId other) { return other < id && !connected.contains(other); });
+      places.Query(*bag, [&](KeyframeId other) { return other < id && !connected.Has(other); });
   const double min_score = LowestNeighborScore(map, places, id, options);
   std::erase_if(found, [&](const PlaceDatabase::Place& place) { return place.score < min_score; });
   if (found.empty()) return {};

@@ -97,6 +97,20 @@ constexpr int64_t kMaxIdLeap = int64_t{1} << 20;
 std::string Name(KeyframeId id) { return "keyframe " + std::to_string(id.value); }
 std::string Name(LandmarkId id) { return "landmark " + std::to_string(id.value); }
 
+// Where the keyframe stands in the list, or would.
+template <class Covisible>
+auto PlaceOf(KeyframeId id, Covisible& covisible) {
+  return std::lower_bound(covisible.begin(), covisible.end(), id,
+                          [](const CovisibleKeyframe& other, KeyframeId key) { return other.id < key; });
+}
+
+void ChangeCount(KeyframeId id, int change, std::vector<CovisibleKeyframe>& covisible) {
+  auto place = PlaceOf(id, covisible);
+  if (place == covisible.end() || place->id != id) place = covisible.insert(place, {id, 0});
+  place->num_shared += change;
+  if (place->num_shared == 0) covisible.erase(place);
+}
+
 }  // namespace
 
 Result<> Map::Apply(const MapDelta& delta) {
@@ -129,10 +143,7 @@ Result<> Map::ApplyLists(const MapDelta& delta) {
   for (const auto& changed : delta.changed_parents) TESSERA_RETURN_IF_FAILED(ChangeParent(changed));
   for (const LandmarkId id : delta.removed_landmarks) TESSERA_RETURN_IF_FAILED(RemoveLandmark(id));
   for (const KeyframeId id : delta.removed_keyframes) TESSERA_RETURN_IF_FAILED(RemoveKeyframe(id));
-  for (const ClosedLoop& loop : delta.closed_loops) {
-    hash_ += HashOf(closed_loops_.size(), loop);
-    closed_loops_.push_back(loop);
-  }
+  for (const ClosedLoop& loop : delta.closed_loops) AddClosedLoop(loop);
   return {};
 }
 
@@ -166,14 +177,12 @@ Result<> Map::MoveKeyframe(const MapDelta::MovedKeyframe& moved) {
 Result<> Map::ChangeLandmark(const MapDelta::ChangedLandmark& changed) {
   const auto& [id, landmark] = changed;
   if (!id.valid() || id.value > landmarks_.end_id() + kMaxIdLeap) return Failed(Name(id) + " can't be added");
-  if (Landmark* old = landmarks_.Find(id); old != nullptr) {
-    hash_ -= HashOf(id, *old);
-    *old = landmark;
-  } else {
-    landmarks_.Put(id, landmark);
-    observations_.Put(id, {});
-  }
-  hash_ += HashOf(id, landmark);
+  ObservedLandmark* held = landmarks_.Find(id);
+  if (held == nullptr) held = &landmarks_.Put(id, {});
+  hash_ -= held->hash;
+  static_cast<Landmark&>(*held) = landmark;
+  held->hash = HashOf(id, landmark);
+  hash_ += held->hash;
   return {};
 }
 
@@ -187,10 +196,10 @@ Result<> Map::ChangeParent(const MapDelta::ChangedParent& changed) {
 }
 
 Result<> Map::RemoveLandmark(LandmarkId id) {
-  if (!landmarks_.Has(id) || !observations_.Find(id)->empty()) return Failed(Name(id) + " can't be removed");
-  hash_ -= HashOf(id, *landmarks_.Find(id));
+  const ObservedLandmark* landmark = landmarks_.Find(id);
+  if (landmark == nullptr || landmark->observations.size() > 0) return Failed(Name(id) + " can't be removed");
+  hash_ -= landmark->hash;
   landmarks_.Remove(id);
-  observations_.Remove(id);
   return {};
 }
 
@@ -206,76 +215,80 @@ Result<> Map::RemoveKeyframe(KeyframeId id) {
 }
 
 Result<> Map::AddObservation(const MapDelta::ChangedObservation& change) {
-  const auto& [landmark, observation] = change;
+  const auto& [landmark_id, observation] = change;
   Keyframe* keyframe = keyframes_.Find(observation.keyframe);
-  std::vector<Observation>* observations = observations_.Find(landmark);
-  if (keyframe == nullptr || observations == nullptr || observation.keypoint < 0 ||
-      static_cast<size_t>(observation.keypoint) >= keyframe->landmarks.size() ||
-      keyframe->landmarks[static_cast<size_t>(observation.keypoint)].valid()) {
-    return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark));
+  ObservedLandmark* landmark = landmarks_.Find(landmark_id);
+  if (keyframe == nullptr || landmark == nullptr || observation.keypoint < 0 ||
+      Index(observation.keypoint) >= keyframe->landmarks.size() ||
+      keyframe->landmarks[Index(observation.keypoint)].valid()) {
+    return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark_id));
   }
-  const auto next = std::lower_bound(observations->begin(), observations->end(), Observation{observation.keyframe, -1});
-  if (next != observations->end() && next->keyframe == observation.keyframe) {
-    return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark) + " twice");
+  const std::span<const Observation> others = landmark->observations.span();
+  const auto next = std::lower_bound(others.begin(), others.end(), Observation{observation.keyframe, -1});
+  if (next != others.end() && next->keyframe == observation.keyframe) {
+    return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark_id) + " twice");
   }
-  for (const Observation& other : *observations) {
-    CountShared(observation.keyframe, other.keyframe, 1);
-  }
-  observations->insert(next, observation);
-  keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = landmark;
+  CountShared(observation.keyframe, *keyframe, others, 1);
+  landmark->observations.Insert(others.data() + (next - others.begin()), observation);
+  keyframe->landmarks[Index(observation.keypoint)] = landmark_id;
   hash_ += HashOf(change);
   return {};
 }
 
 Result<> Map::RemoveObservation(const MapDelta::ChangedObservation& change) {
-  const auto& [landmark, observation] = change;
+  const auto& [landmark_id, observation] = change;
   Keyframe* keyframe = keyframes_.Find(observation.keyframe);
-  std::vector<Observation>* observations = observations_.Find(landmark);
-  if (keyframe == nullptr || observations == nullptr || std::erase(*observations, observation) == 0) {
-    return Failed(Name(observation.keyframe) + " does not observe " + Name(landmark));
+  ObservedLandmark* landmark = landmarks_.Find(landmark_id);
+  const Observation* seen = nullptr;
+  if (landmark != nullptr) {
+    seen = std::find(landmark->observations.begin(), landmark->observations.end(), observation);
   }
-  for (const Observation& other : *observations) {
-    CountShared(observation.keyframe, other.keyframe, -1);
+  if (keyframe == nullptr || landmark == nullptr || seen == landmark->observations.end()) {
+    return Failed(Name(observation.keyframe) + " does not observe " + Name(landmark_id));
   }
-  keyframe->landmarks[static_cast<size_t>(observation.keypoint)] = LandmarkId{};
+  landmark->observations.Remove(seen);
+  CountShared(observation.keyframe, *keyframe, landmark->observations.span(), -1);
+  keyframe->landmarks[Index(observation.keypoint)] = LandmarkId{};
   hash_ -= HashOf(change);
   return {};
 }
 
-void Map::CountShared(KeyframeId a, KeyframeId b, int change) {
-  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
-    auto& covisible = keyframes_.Find(from)->covisible;
-    if ((covisible[to] += change) == 0) {
-      covisible.erase(to);
-    }
+void Map::AddClosedLoop(const ClosedLoop& loop) {
+  hash_ += HashOf(closed_loops_.size(), loop);
+  closed_loops_.push_back(loop);
+}
+
+// The keyframe came to see (1) or no longer sees (-1) a landmark that the others see.
+void Map::CountShared(KeyframeId id, Keyframe& keyframe, std::span<const Observation> others, int change) {
+  for (const Observation& other : others) {
+    ChangeCount(other.keyframe, change, keyframe.covisible);
+    ChangeCount(id, change, keyframes_.Find(other.keyframe)->covisible);
   }
-}
-
-const std::vector<Observation>& Map::ObservationsOf(LandmarkId id) const {
-  static const std::vector<Observation> kNone;
-  const std::vector<Observation>* observations = observations_.Find(id);
-  return observations == nullptr ? kNone : *observations;
-}
-
-bool Map::IsSeenBy(LandmarkId landmark, KeyframeId keyframe) const {
-  const std::vector<Observation>& observations = ObservationsOf(landmark);
-  return std::any_of(observations.begin(), observations.end(),
-                     [&](const Observation& observation) { return observation.keyframe == keyframe; });
 }
 
 std::vector<KeyframeId> Map::Covisible(KeyframeId id, int max_num, int min_shared) const {
   std::vector<std::pair<int32_t, KeyframeId>> ranked;
   if (const Keyframe* keyframe = keyframes_.Find(id); keyframe != nullptr) {
+    ranked.reserve(keyframe->covisible.size());
     for (const auto& [other, num_shared] : keyframe->covisible) {
       if (num_shared >= min_shared) ranked.emplace_back(-num_shared, other);
     }
   }
-  std::sort(ranked.begin(), ranked.end());
+  const size_t num = std::min(ranked.size(), static_cast<size_t>(max_num));
+  const auto end = ranked.begin() + static_cast<ptrdiff_t>(num);
+  if (end != ranked.end()) std::nth_element(ranked.begin(), end, ranked.end());
+  std::sort(ranked.begin(), end);
   std::vector<KeyframeId> ids;
-  for (size_t i = 0; i < ranked.size() && i < static_cast<size_t>(max_num); ++i) {
-    ids.push_back(ranked[i].second);
-  }
+  ids.reserve(num);
+  for (size_t i = 0; i < num; ++i) ids.push_back(ranked[i].second);
   return ids;
+}
+
+int Map::NumShared(KeyframeId a, KeyframeId b) const {
+  const Keyframe* keyframe = keyframes_.Find(a);
+  if (keyframe == nullptr) return 0;
+  const auto place = PlaceOf(b, keyframe->covisible);
+  return place != keyframe->covisible.end() && place->id == b ? place->num_shared : 0;
 }
 
 MapDelta Map::Snapshot() const {
@@ -287,9 +300,9 @@ MapDelta Map::Snapshot() const {
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
     delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features, keyframe.scale});
   });
-  landmarks_.ForEach([&](LandmarkId id, const Landmark& landmark) {
+  landmarks_.ForEach([&](LandmarkId id, const ObservedLandmark& landmark) {
     delta.changed_landmarks.push_back({id, landmark});
-    for (const Observation& observation : *observations_.Find(id)) {
+    for (const Observation& observation : landmark.observations) {
       delta.new_observations.push_back({id, observation});
     }
   });

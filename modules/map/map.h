@@ -6,15 +6,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
-#include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/id_map.h"
 #include "core/ids.h"
 #include "core/result.h"
+#include "core/small_vector.h"
 #include "features/feature_types.h"
 #include "geometry/rigid3.h"
 
@@ -38,6 +40,24 @@ struct Landmark {
   bool operator==(const Landmark&) const = default;
 };
 
+// A landmark in the map, and who sees it.
+struct ObservedLandmark : Landmark {
+  SmallVector<Observation, 4> observations;  // sorted by keyframe
+  uint64_t hash = 0;                         // the landmark's share of the map's, without its observations
+
+  bool IsSeenBy(KeyframeId keyframe) const {
+    return std::any_of(observations.begin(), observations.end(),
+                       [keyframe](const Observation& observation) { return observation.keyframe == keyframe; });
+  }
+};
+
+// A keyframe that shares landmarks with another one.
+struct CovisibleKeyframe {
+  KeyframeId id;
+  int32_t num_shared = 0;
+  bool operator==(const CovisibleKeyframe&) const = default;
+};
+
 // A keyframe in the map: its features never change, its pose does.
 //
 // Closing a loop of mono changes the scale of the map, by another factor at each keyframe. What was measured relative
@@ -52,8 +72,8 @@ struct Keyframe {
   Sim3 WorldFromKeyframe() const { return Sim3::From(world_from_camera, scale); }
 
   KeyframeId parent;  // spanning tree: the older keyframe that shared most landmarks at birth; invalid: the root
-  std::vector<LandmarkId> landmarks;        // by keypoint; invalid: none
-  std::map<KeyframeId, int32_t> covisible;  // keyframes that share landmarks, and how many
+  std::vector<LandmarkId> landmarks;         // by keypoint; invalid: none
+  std::vector<CovisibleKeyframe> covisible;  // by id
 };
 
 // Two keyframes that see the same place, by which the map was corrected.
@@ -86,7 +106,7 @@ struct MapDelta {
   struct ChangedObservation {
     LandmarkId landmark;
     Observation observation;
-    bool operator==(const ChangedObservation&) const = default;
+    auto operator<=>(const ChangedObservation&) const = default;
   };
   struct ChangedParent {
     KeyframeId id;
@@ -124,15 +144,23 @@ class Map {
   const Keyframe* FindKeyframe(KeyframeId id) const { return keyframes_.Find(id); }
   const Landmark* FindLandmark(LandmarkId id) const { return landmarks_.Find(id); }
   // Sorted by keyframe; empty if there is no such landmark.
-  const std::vector<Observation>& ObservationsOf(LandmarkId id) const;
-  bool IsSeenBy(LandmarkId landmark, KeyframeId keyframe) const;
+  std::span<const Observation> ObservationsOf(LandmarkId id) const {
+    const ObservedLandmark* landmark = landmarks_.Find(id);
+    return landmark == nullptr ? std::span<const Observation>{} : landmark->observations.span();
+  }
+  bool IsSeenBy(LandmarkId id, KeyframeId keyframe) const {
+    const ObservedLandmark* landmark = landmarks_.Find(id);
+    return landmark != nullptr && landmark->IsSeenBy(keyframe);
+  }
   const IdMap<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
-  const IdMap<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
+  const IdMap<LandmarkId, ObservedLandmark>& landmarks() const { return landmarks_; }
   // In the order in which they were closed. Their keyframes stay in the map.
   const std::vector<ClosedLoop>& closed_loops() const { return closed_loops_; }
 
   // Keyframes that share at least `min_shared` landmarks with `id`, most first, ties by lower id, at most `max_num`.
   std::vector<KeyframeId> Covisible(KeyframeId id, int max_num, int min_shared = 1) const;
+  // How many landmarks both keyframes see.
+  int NumShared(KeyframeId a, KeyframeId b) const;
 
   // The whole map as a delta.
   MapDelta Snapshot() const;
@@ -151,11 +179,11 @@ class Map {
   Result<> RemoveKeyframe(KeyframeId id);
   Result<> AddObservation(const MapDelta::ChangedObservation& change);
   Result<> RemoveObservation(const MapDelta::ChangedObservation& change);
-  void CountShared(KeyframeId a, KeyframeId b, int change);
+  void AddClosedLoop(const ClosedLoop& loop);
+  void CountShared(KeyframeId id, Keyframe& keyframe, std::span<const Observation> others, int change);
 
   IdMap<KeyframeId, Keyframe> keyframes_;
-  IdMap<LandmarkId, Landmark> landmarks_;
-  IdMap<LandmarkId, std::vector<Observation>> observations_;
+  IdMap<LandmarkId, ObservedLandmark> landmarks_;
   std::vector<ClosedLoop> closed_loops_;
   int64_t next_delta_ = 0;
   KeyframeId answered_;

@@ -2,18 +2,22 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <string>
+#include <utility>
 
 namespace tessera {
 
+namespace {
+
 // An edit needs no number and no hash of its own: the delta of all edits gets them.
-void MapEditor::Apply(MapDelta&& edit) { ThrowIfFailed<std::logic_error>(map_.ApplyLists(edit), "map editor: "); }
+void Check(const Result<>& applied) { ThrowIfFailed<std::logic_error>(applied, "map editor: "); }
+
+}  // namespace
 
 void MapEditor::AddKeyframe(KeyframeId id, KeyframeId parent, const Sim3& world_from_keyframe,
                             std::shared_ptr<const FeatureFrame> features) {
   const MapDelta::NewKeyframe added{id, parent, world_from_keyframe.Pose(), std::move(features),
                                     world_from_keyframe.scale};
-  Apply({.new_keyframes = {added}});
+  Check(map_.AddKeyframe(added));
   new_keyframes_[id] = added;
 }
 
@@ -22,13 +26,13 @@ void MapEditor::MoveKeyframe(KeyframeId id, const Rigid3& world_from_camera) {
 }
 
 void MapEditor::MoveKeyframe(KeyframeId id, const Sim3& world_from_keyframe) {
-  Apply({.moved_keyframes = {{id, world_from_keyframe.Pose(), world_from_keyframe.scale}}});
-  changed_poses_.insert(id);
+  Check(map_.MoveKeyframe({id, world_from_keyframe.Pose(), world_from_keyframe.scale}));
+  changed_poses_.Add(id);
 }
 
 void MapEditor::SetParent(KeyframeId id, KeyframeId parent) {
-  Apply({.changed_parents = {{id, parent}}});
-  changed_parents_.insert(id);
+  Check(map_.ChangeParent({id, parent}));
+  changed_parents_.Add(id);
 }
 
 void MapEditor::RemoveKeyframe(KeyframeId id) {
@@ -38,44 +42,39 @@ void MapEditor::RemoveKeyframe(KeyframeId id) {
       RemoveObservation(landmarks[i], {id, static_cast<int32_t>(i)});
     }
   }
-  Apply({.removed_keyframes = {id}});
-  changed_poses_.erase(id);
-  changed_parents_.erase(id);
+  Check(map_.RemoveKeyframe(id));
+  changed_poses_.Remove(id);
+  changed_parents_.Remove(id);
   if (new_keyframes_.erase(id) == 0) {
-    removed_keyframes_.insert(id);
+    removed_keyframes_.Add(id);
   }
 }
 
 LandmarkId MapEditor::AddLandmark(const Landmark& landmark) {
   const LandmarkId id{map_.landmarks().end_id()};
-  Apply({.changed_landmarks = {{id, landmark}}});
-  new_landmarks_.insert(id);
-  changed_landmarks_.insert(id);
-  touched_.insert(id);
+  ChangeLandmark(id, landmark);
+  new_landmarks_.Add(id);
   return id;
 }
 
 void MapEditor::ChangeLandmark(LandmarkId id, const Landmark& landmark) {
-  Apply({.changed_landmarks = {{id, landmark}}});
-  changed_landmarks_.insert(id);
-  touched_.insert(id);
+  Check(map_.ChangeLandmark({id, landmark}));
+  changed_landmarks_.Add(id);
+  touched_.Add(id);
 }
 
 void MapEditor::RemoveLandmark(LandmarkId id) {
-  const std::vector<Observation> observations = map_.ObservationsOf(id);
-  for (const Observation& observation : observations) {
-    RemoveObservation(id, observation);
-  }
-  Apply({.removed_landmarks = {id}});
-  changed_landmarks_.erase(id);
-  touched_.erase(id);
-  if (new_landmarks_.erase(id) == 0) {
-    removed_landmarks_.insert(id);
+  while (!map_.ObservationsOf(id).empty()) RemoveObservation(id, map_.ObservationsOf(id).back());
+  Check(map_.RemoveLandmark(id));
+  changed_landmarks_.Remove(id);
+  touched_.Remove(id);
+  if (!new_landmarks_.Remove(id)) {
+    removed_landmarks_.Add(id);
   }
 }
 
 void MapEditor::MergeLandmarks(LandmarkId removed, LandmarkId kept) {
-  const std::vector<Observation> observations = map_.ObservationsOf(removed);
+  const auto observations = map_.landmarks().Find(removed)->observations;
   RemoveLandmark(removed);
   for (const Observation& observation : observations) {
     if (!map_.IsSeenBy(kept, observation.keyframe)) {
@@ -85,21 +84,24 @@ void MapEditor::MergeLandmarks(LandmarkId removed, LandmarkId kept) {
 }
 
 void MapEditor::AddObservation(LandmarkId landmark, const Observation& observation) {
-  Apply({.new_observations = {{landmark, observation}}});
-  ++observations_[{landmark, observation}];
-  touched_.insert(landmark);
-  reobserved_.insert(landmark);
+  const MapDelta::ChangedObservation fact{landmark, observation};
+  EditObservation({fact, 1}, map_.AddObservation(fact));
 }
 
 void MapEditor::RemoveObservation(LandmarkId landmark, const Observation& observation) {
-  Apply({.removed_observations = {{landmark, observation}}});
-  --observations_[{landmark, observation}];
-  touched_.insert(landmark);
-  reobserved_.insert(landmark);
+  const MapDelta::ChangedObservation fact{landmark, observation};
+  EditObservation({fact, -1}, map_.RemoveObservation(fact));
+}
+
+void MapEditor::EditObservation(const ObservationEdit& edit, const Result<>& applied) {
+  Check(applied);
+  observations_.push_back(edit);
+  touched_.Add(edit.fact.landmark);
+  reobserved_.Add(edit.fact.landmark);
 }
 
 void MapEditor::AddClosedLoop(const ClosedLoop& loop) {
-  Apply({.closed_loops = {loop}});
+  map_.AddClosedLoop(loop);
   closed_loops_.push_back(loop);
 }
 
@@ -111,27 +113,36 @@ MapDelta MapEditor::Finish(KeyframeId answers) {
   for (const auto& [id, added] : new_keyframes_) {
     delta.new_keyframes.push_back(added);
   }
-  for (const KeyframeId id : changed_poses_) {
+  changed_poses_.ForEach([&](KeyframeId id) {
     const Keyframe& keyframe = *map_.FindKeyframe(id);
     delta.moved_keyframes.push_back({id, keyframe.world_from_camera, keyframe.scale});
-  }
-  for (const LandmarkId id : changed_landmarks_) {
+  });
+  const std::vector<LandmarkId> changed_landmarks = changed_landmarks_.Ids();
+  delta.changed_landmarks.reserve(changed_landmarks.size());
+  for (const LandmarkId id : changed_landmarks) {
     delta.changed_landmarks.push_back({id, *map_.FindLandmark(id)});
   }
-  for (const auto& [fact, change] : observations_) {
-    if (change == 0) continue;
-    auto& list = change > 0 ? delta.new_observations : delta.removed_observations;
-    list.push_back({fact.first, fact.second});
-  }
-  for (const KeyframeId id : changed_parents_) {
-    delta.changed_parents.push_back({id, map_.FindKeyframe(id)->parent});
-  }
-  delta.removed_landmarks.assign(removed_landmarks_.begin(), removed_landmarks_.end());
-  delta.removed_keyframes.assign(removed_keyframes_.begin(), removed_keyframes_.end());
+  ListObservations(delta);
+  changed_parents_.ForEach(
+      [&](KeyframeId id) { delta.changed_parents.push_back({id, map_.FindKeyframe(id)->parent}); });
+  delta.removed_landmarks = removed_landmarks_.Ids();
+  delta.removed_keyframes = removed_keyframes_.Ids();
   delta.hash = map_.hash();
   map_.next_delta_ = number_ + 1;
   map_.answered_ = answers;
   return delta;
+}
+
+// Each fact that is true now and was not before, or the other way round, by landmark and keyframe.
+void MapEditor::ListObservations(MapDelta& delta) {
+  std::sort(observations_.begin(), observations_.end(),
+            [](const ObservationEdit& a, const ObservationEdit& b) { return a.fact < b.fact; });
+  for (auto edit = observations_.begin(); edit != observations_.end();) {
+    const MapDelta::ChangedObservation fact = edit->fact;
+    int change = 0;
+    for (; edit != observations_.end() && edit->fact == fact; ++edit) change += edit->change;
+    if (change != 0) (change > 0 ? delta.new_observations : delta.removed_observations).push_back(fact);
+  }
 }
 
 }  // namespace tessera

@@ -1,13 +1,14 @@
 // The owner's way to change its map: each edit is applied at once, and all of them together become one delta with
 // nothing in it that a later edit took back.
 //
-// Every edit goes through the function that applies deltas, so the owner's map changes in the way of all replicas.
+// Every edit goes through the functions that apply deltas, so the owner's map changes in the way of all replicas.
 #pragma once
 
 #include <map>
-#include <set>
-#include <utility>
+#include <memory>
+#include <vector>
 
+#include "core/id_set.h"
 #include "map/map.h"
 
 namespace tessera {
@@ -43,23 +44,28 @@ class MapEditor {
   void AddClosedLoop(const ClosedLoop& loop);
 
   // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
-  const std::set<LandmarkId>& touched_landmarks() const { return touched_; }
+  const IdSet<LandmarkId>& touched_landmarks() const { return touched_; }
   // Whether an observation of the landmark came or went.
-  bool IsReobserved(LandmarkId id) const { return reobserved_.contains(id); }
+  bool IsReobserved(LandmarkId id) const { return reobserved_.Has(id); }
 
   // The delta of all edits. The editor must not be used after it.
   MapDelta Finish(KeyframeId answers);
 
  private:
-  void Apply(MapDelta&& edit);
+  struct ObservationEdit {
+    MapDelta::ChangedObservation fact;
+    int change = 0;  // 1: new, -1: removed
+  };
+  void EditObservation(const ObservationEdit& edit, const Result<>& applied);
+  void ListObservations(MapDelta& delta);
 
   Map& map_;
   const int64_t number_;
   std::map<KeyframeId, MapDelta::NewKeyframe> new_keyframes_;
-  std::set<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
-  std::set<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_, reobserved_;
+  IdSet<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
+  IdSet<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_, reobserved_;
   std::vector<ClosedLoop> closed_loops_;
-  std::map<std::pair<LandmarkId, Observation>, int> observations_;  // +1: new, -1: removed, 0: taken back
+  std::vector<ObservationEdit> observations_;  // in the order of the edits
 };
 
 }  // namespace tessera

@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <span>
 
 namespace tessera {
 namespace {
 
 // Whether enough other keyframes observe the landmark at the scale of `own` or a finer one.
 bool IsWellObserved(const Map& map, LandmarkId landmark, KeyframeId own, int level, int min_observers) {
+  const std::span<const Observation> observations = map.ObservationsOf(landmark);
+  if (observations.size() <= static_cast<size_t>(min_observers)) return false;
   int num_observers = 0;
-  for (const Observation& observation : map.ObservationsOf(landmark)) {
+  for (const Observation& observation : observations) {
     if (observation.keyframe == own) continue;
     const Keyframe& other = *map.FindKeyframe(observation.keyframe);
     num_observers += other.features->keypoints[static_cast<size_t>(observation.keypoint)].level <= level + 1 ? 1 : 0;

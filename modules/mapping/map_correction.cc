@@ -10,14 +10,13 @@
 namespace tessera {
 namespace {
 
-// The given corrections, and those that their descendants take over.
-Corrections WithDescendants(const Map& map, const Corrections& given) {
-  Corrections all = given;
-  map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-    if (given.contains(id)) return;
-    for (KeyframeId ancestor = keyframe.parent; ancestor.valid(); ancestor = map.FindKeyframe(ancestor)->parent) {
+// The given corrections of keyframes of the map, and those that their descendants take over.
+IdMap<KeyframeId, Sim3> WithDescendants(const Map& map, const Corrections& given) {
+  IdMap<KeyframeId, Sim3> all;
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
+    for (KeyframeId ancestor = id; ancestor.valid(); ancestor = map.FindKeyframe(ancestor)->parent) {
       if (const auto found = given.find(ancestor); found != given.end()) {
-        all.emplace(id, found->second);
+        all.Put(id, found->second);
         return;
       }
     }
@@ -67,20 +66,15 @@ void FuseVisits(const LoopResult& loop, const LoopFusionOptions& options, MapEdi
 
 void ApplyCorrections(const Corrections& given, MapEditor& editor) {
   const Map& map = editor.map();
-  const Corrections corrections = WithDescendants(map, given);
-  std::vector<std::pair<LandmarkId, Landmark>> moved;
-  map.landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
-    const std::vector<Observation>& observations = map.ObservationsOf(id);
-    const auto found = observations.empty() ? corrections.end() : corrections.find(observations.front().keyframe);
-    if (found == corrections.end()) return;
-    moved.emplace_back(id, InWorld(found->second, landmark));
+  const IdMap<KeyframeId, Sim3> corrections = WithDescendants(map, given);
+  map.landmarks().ForEach([&](LandmarkId id, const ObservedLandmark& landmark) {
+    const bool is_seen = landmark.observations.size() > 0;
+    const Sim3* new_world_from_old = is_seen ? corrections.Find(landmark.observations.begin()->keyframe) : nullptr;
+    if (new_world_from_old != nullptr) editor.ChangeLandmark(id, InWorld(*new_world_from_old, landmark));
   });
-  for (const auto& [id, landmark] : moved) editor.ChangeLandmark(id, landmark);
-  for (const auto& [id, new_world_from_old] : corrections) {
-    if (const Keyframe* keyframe = map.FindKeyframe(id)) {
-      editor.MoveKeyframe(id, new_world_from_old * keyframe->WorldFromKeyframe());
-    }
-  }
+  corrections.ForEach([&](KeyframeId id, const Sim3& new_world_from_old) {
+    editor.MoveKeyframe(id, new_world_from_old * map.FindKeyframe(id)->WorldFromKeyframe());
+  });
 }
 
 void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEditor& editor) {
@@ -98,10 +92,9 @@ void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEdit
 AdjustmentBase TakeBase(const Map& map) {
   AdjustmentBase base;
   map.keyframes().ForEach(
-      [&](KeyframeId id, const Keyframe& keyframe) { base.world_from_camera.emplace(id, keyframe.world_from_camera); });
-  map.landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
-    base.positions_in_world.emplace(id, landmark.position_in_world);
-  });
+      [&](KeyframeId id, const Keyframe& keyframe) { base.world_from_camera.Put(id, keyframe.world_from_camera); });
+  map.landmarks().ForEach(
+      [&](LandmarkId id, const Landmark& landmark) { base.positions_in_world.Put(id, landmark.position_in_world); });
   return base;
 }
 
@@ -109,23 +102,20 @@ void ApplyAdjustment(const GlobalAdjustment& adjustment, const AdjustmentBase& b
   const Map& map = editor.map();
   Corrections corrections;
   for (const GlobalAdjustment::Pose& pose : adjustment.poses) {
-    const auto old = base.world_from_camera.find(pose.id);
-    if (old == base.world_from_camera.end()) continue;
-    corrections.emplace(pose.id, Sim3::From(pose.world_from_camera * old->second.Inverse()));
+    const Rigid3* old = base.world_from_camera.Find(pose.id);
+    if (old != nullptr) corrections.emplace(pose.id, Sim3::From(pose.world_from_camera * old->Inverse()));
   }
-  std::map<LandmarkId, Eigen::Vector3d> adjusted;  // of those that have not moved since
+  std::vector<GlobalAdjustment::Point> adjusted;  // of those that have not moved since
   for (const GlobalAdjustment::Point& point : adjustment.points) {
-    const auto old = base.positions_in_world.find(point.id);
+    const Eigen::Vector3d* old = base.positions_in_world.Find(point.id);
     const Landmark* landmark = map.FindLandmark(point.id);
-    if (landmark != nullptr && old != base.positions_in_world.end() && old->second == landmark->position_in_world) {
-      adjusted.emplace(point.id, point.position_in_world);
-    }
+    if (landmark != nullptr && old != nullptr && *old == landmark->position_in_world) adjusted.push_back(point);
   }
   ApplyCorrections(corrections, editor);
-  for (const auto& [id, position_in_world] : adjusted) {
-    Landmark landmark = *map.FindLandmark(id);
-    landmark.position_in_world = position_in_world;
-    editor.ChangeLandmark(id, landmark);
+  for (const GlobalAdjustment::Point& point : adjusted) {
+    Landmark landmark = *map.FindLandmark(point.id);
+    landmark.position_in_world = point.position_in_world;
+    editor.ChangeLandmark(point.id, landmark);
   }
 }
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <map>
-#include <optional>
 
+#include "core/id_map.h"
 #include "map/map_editor.h"
 #include "mapping/landmark_fusion.h"
 #include "messages/loop_types.h"
@@ -34,8 +34,8 @@ void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEdit
 
 // The map's poses and positions at the moment when a global adjustment was requested.
 struct AdjustmentBase {
-  std::map<KeyframeId, Rigid3> world_from_camera;
-  std::map<LandmarkId, Eigen::Vector3d> positions_in_world;
+  IdMap<KeyframeId, Rigid3> world_from_camera;
+  IdMap<LandmarkId, Eigen::Vector3d> positions_in_world;
 };
 AdjustmentBase TakeBase(const Map& map);
 

@@ -32,15 +32,14 @@ void ChooseParent(KeyframeId id, MapEditor& editor) {
 
 // Whether the remaining observations determine the position: two of them, or one with depth.
 bool IsDetermined(const Map& map, LandmarkId id) {
-  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  const std::span<const Observation> observations = map.ObservationsOf(id);
   if (observations.size() != 1) return observations.size() > 1;
   return SeenAt(*map.FindKeyframe(observations[0].keyframe)->features, observations[0].keypoint).has_right();
 }
 
 // Descriptors, normals and distances follow from observations and poses; landmarks that are no longer determined go.
 void RefreshDescriptions(MapEditor& editor) {
-  const std::vector<LandmarkId> touched(editor.touched_landmarks().begin(), editor.touched_landmarks().end());
-  for (const LandmarkId id : touched) {
+  for (const LandmarkId id : editor.touched_landmarks().Ids()) {
     if (!IsDetermined(editor.map(), id)) {
       editor.RemoveLandmark(id);
     } else {
@@ -81,6 +80,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   CullKeyframes(seen.id, options_.keyframe_culling, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
+  for (const KeyframeId id : delta.removed_keyframes) motions_.erase(id);
   delta.asks_adjustment = AskForAdjustment(seen.id);
   return delta;
 }
@@ -157,11 +157,7 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
                      std::make_shared<const FeatureFrame>(seen.features));
 }
 
-// Priors of keyframes that have left the map since are forgotten.
 void Mapper::RememberMotion(const KeyframeObservation& seen) {
-  std::erase_if(motions_, [this](const auto& motion) {
-    return map_.FindKeyframe(motion.first) == nullptr || map_.FindKeyframe(motion.second.reference) == nullptr;
-  });
   if (seen.expected.is_known()) motions_[seen.id] = {seen.reference, seen.expected};
 }
 

@@ -1,8 +1,9 @@
 #include "measurement/landmark_description.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <vector>
+#include <span>
 
 #include "features/pyramid.h"
 #include "measurement/keypoint_measurement.h"
@@ -14,7 +15,7 @@ constexpr size_t kConfirmingObservations = 3;
 constexpr double kMaxKnownShare = 0.6;  // of the distance
 
 Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in_world,
-                              const std::vector<Observation>& observations) {
+                              std::span<const Observation> observations) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Observation& observation : observations) {
     const Eigen::Vector3d& camera_in_world = map.FindKeyframe(observation.keyframe)->world_from_camera.translation;
@@ -24,7 +25,7 @@ Eigen::Vector3d MeanDirection(const Map& map, const Eigen::Vector3d& position_in
 }
 
 // How well the observations fix the position along the normal, the cameras' poses taken as exact.
-double DepthInformation(const Map& map, const Landmark& landmark, const std::vector<Observation>& observations) {
+double DepthInformation(const Map& map, const Landmark& landmark, std::span<const Observation> observations) {
   double information = 0.0;
   for (const Observation& observation : observations) {
     const Keyframe& keyframe = *map.FindKeyframe(observation.keyframe);
@@ -33,22 +34,29 @@ double DepthInformation(const Map& map, const Landmark& landmark, const std::vec
   return information;
 }
 
-Descriptor Medoid(const std::vector<Descriptor>& descriptors) {
+// Of the newest kMaxDescriptors observations.
+Descriptor Medoid(const Map& map, std::span<const Observation> observations) {
+  const size_t num = std::min<size_t>(observations.size(), kMaxDescriptors);
+  std::array<const Descriptor*, kMaxDescriptors> descriptors{};
+  std::array<std::array<int, kMaxDescriptors>, kMaxDescriptors> distances{};
+  for (size_t i = 0; i < num; ++i) {
+    const auto& [keyframe, keypoint] = observations[observations.size() - num + i];
+    descriptors[i] = &map.FindKeyframe(keyframe)->features->descriptors[Index(keypoint)];
+    for (size_t j = 0; j < i; ++j) {
+      distances[i][j] = distances[j][i] = HammingDistance(*descriptors[i], *descriptors[j]);
+    }
+  }
   size_t best = 0;
   int best_median = 257;
-  std::vector<int> distances(descriptors.size());
-  for (size_t i = 0; i < descriptors.size(); ++i) {
-    for (size_t j = 0; j < descriptors.size(); ++j) {
-      distances[j] = HammingDistance(descriptors[i], descriptors[j]);
-    }
-    const auto middle = distances.begin() + static_cast<ptrdiff_t>((distances.size() - 1) / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
+  for (size_t i = 0; i < num; ++i) {
+    const auto begin = distances[i].begin(), middle = begin + static_cast<ptrdiff_t>((num - 1) / 2);
+    std::nth_element(begin, middle, begin + static_cast<ptrdiff_t>(num));
     if (*middle < best_median) {
       best_median = *middle;
       best = i;
     }
   }
-  return descriptors[best];
+  return *descriptors[best];
 }
 
 }  // namespace
@@ -85,7 +93,7 @@ bool HasDepth(const Landmark& landmark, const Eigen::Vector3d& camera_in_world) 
 
 Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
   Landmark landmark = *map.FindLandmark(id);
-  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  const std::span<const Observation> observations = map.ObservationsOf(id);
   landmark.normal = MeanDirection(map, landmark.position_in_world, observations);
 
   const Keyframe& newest = *map.FindKeyframe(observations.back().keyframe);
@@ -103,14 +111,7 @@ Landmark DescribeMovedLandmark(const Map& map, LandmarkId id) {
 
 Landmark DescribeLandmark(const Map& map, LandmarkId id) {
   Landmark landmark = DescribeMovedLandmark(map, id);
-  const std::vector<Observation>& observations = map.ObservationsOf(id);
-  std::vector<Descriptor> descriptors;
-  const size_t first = observations.size() > kMaxDescriptors ? observations.size() - kMaxDescriptors : 0;
-  for (size_t i = first; i < observations.size(); ++i) {
-    const FeatureFrame& features = *map.FindKeyframe(observations[i].keyframe)->features;
-    descriptors.push_back(features.descriptors[Index(observations[i].keypoint)]);
-  }
-  landmark.descriptor = Medoid(descriptors);
+  landmark.descriptor = Medoid(map, map.ObservationsOf(id));
   return landmark;
 }
 

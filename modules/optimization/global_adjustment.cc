@@ -13,7 +13,7 @@ LocalWindow WholePart(const Map& map, KeyframeId member) {
   LocalWindow window;
   window.inner = MapPartOf(map, member);
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
-    const std::vector<Observation>& observations = map.ObservationsOf(id);
+    const std::span<const Observation> observations = map.ObservationsOf(id);
     if (observations.size() < 2) return;
     const bool is_inside = std::binary_search(window.inner.begin(), window.inner.end(), observations.front().keyframe);
     if (is_inside) window.landmarks.push_back(id);

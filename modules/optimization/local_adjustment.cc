@@ -26,32 +26,28 @@ void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleP
   if (problem.num_fixed_poses() == 0) problem.poses.front().is_fixed = true;
 }
 
-// Index of the keyframe among the poses; -1: not in the window.
-int PoseIndex(const BundleProblem& problem, const std::vector<size_t>& by_id, KeyframeId id) {
-  const auto found = std::lower_bound(by_id.begin(), by_id.end(), id,
-                                      [&](size_t index, KeyframeId key) { return problem.poses[index].id < key; });
-  return found != by_id.end() && problem.poses[*found].id == id ? static_cast<int>(*found) : -1;
-}
-
 // The observations of the first `num_observers` poses; landmarks that have fewer than two are left out.
 void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size_t num_observers,
                   BundleProblem& problem) {
-  std::vector<size_t> by_id(num_observers);
-  for (size_t i = 0; i < by_id.size(); ++i) by_id[i] = i;
-  std::sort(by_id.begin(), by_id.end(), [&](size_t a, size_t b) { return problem.poses[a].id < problem.poses[b].id; });
+  std::vector<int> pose_of(static_cast<size_t>(map.keyframes().end_id()), -1);  // by keyframe; -1: none of them
+  std::vector<const FeatureFrame*> features(num_observers);
+  for (size_t i = 0; i < num_observers; ++i) {
+    pose_of[static_cast<size_t>(problem.poses[i].id.value)] = static_cast<int>(i);
+    features[i] = map.FindKeyframe(problem.poses[i].id)->features.get();
+  }
   for (const LandmarkId id : landmarks) {
+    const ObservedLandmark& landmark = *map.landmarks().Find(id);
     const int point = static_cast<int>(problem.points.size());
     const size_t num_before = problem.observations.size();
-    for (const Observation& observation : map.ObservationsOf(id)) {
-      const int pose = PoseIndex(problem, by_id, observation.keyframe);
+    for (const Observation& observation : landmark.observations) {
+      const int pose = pose_of[static_cast<size_t>(observation.keyframe.value)];
       if (pose < 0) continue;
-      const FeatureFrame& features = *map.FindKeyframe(observation.keyframe)->features;
-      problem.observations.push_back({pose, point, SeenAt(features, observation.keypoint)});
+      problem.observations.push_back({pose, point, SeenAt(*features[Index(pose)], observation.keypoint)});
     }
     if (problem.observations.size() - num_before < 2) {
       problem.observations.resize(num_before);
     } else {
-      problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
+      problem.points.push_back({id, landmark.position_in_world});
     }
   }
 }
@@ -80,7 +76,7 @@ void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
       constraint.from = static_cast<int>(i);
       constraint.to = static_cast<int>(other);
       constraint.to_from_from = problem.poses[other].camera_from_world * problem.poses[i].camera_from_world.Inverse();
-      const double num_shared = keyframe.covisible.at(id);
+      const double num_shared = map.NumShared(problem.poses[i].id, id);
       constraint.information *= num_shared / (rad_per_px * rad_per_px);
       constraint.information.topLeftCorner<3, 3>() /= depth * depth;
       problem.constraints.push_back(constraint);
@@ -124,7 +120,7 @@ int ScalePose(const BundleProblem& problem) {
 }
 
 bool IsConfirmed(const Map& map, LandmarkId id) {
-  const std::vector<Observation>& observations = map.ObservationsOf(id);
+  const std::span<const Observation> observations = map.ObservationsOf(id);
   return observations.size() >= kConfirmingObservers ||
          std::any_of(observations.begin(), observations.end(), [&](const Observation& seen) {
            return SeenAt(*map.FindKeyframe(seen.keyframe)->features, seen.keypoint).has_right();
@@ -197,7 +193,7 @@ void WriteBack(const BundleProblem& problem, const BundleResult& result, MapEdit
     if (result.is_inlier[i]) continue;
     const LandmarkId landmark = problem.points[static_cast<size_t>(problem.observations[i].point)].id;
     const KeyframeId keyframe = problem.poses[static_cast<size_t>(problem.observations[i].pose)].id;
-    const std::vector<Observation>& observations = map.ObservationsOf(landmark);
+    const std::span<const Observation> observations = map.ObservationsOf(landmark);
     const auto seen = std::find_if(observations.begin(), observations.end(),
                                    [&](const Observation& o) { return o.keyframe == keyframe; });
     if (seen != observations.end()) editor.RemoveObservation(landmark, Observation(*seen));

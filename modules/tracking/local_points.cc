@@ -1,8 +1,6 @@
 #include "tracking/local_points.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
 
 #include "map/neighborhood.h"
 
@@ -14,19 +12,16 @@ constexpr int kMaxCovisible = 10;  // of each keyframe
 }  // namespace
 
 std::vector<KeyframeId> LocalKeyframes(const Map& map, const TrackedFrame& frame, int max_keyframes) {
-  std::map<KeyframeId, int> num_shared;
+  std::vector<LandmarkId> seen;
   for (const SeenPoint& point : frame.points) {
-    for (const Observation& observation : map.ObservationsOf(point.id.landmark)) ++num_shared[observation.keyframe];
+    if (point.id.landmark.valid()) seen.push_back(point.id.landmark);
   }
-  std::vector<std::pair<int, KeyframeId>> ranked;
-  for (const auto& [id, count] : num_shared) ranked.emplace_back(-count, id);
-  std::sort(ranked.begin(), ranked.end());
-  ranked.resize(std::min(ranked.size(), static_cast<size_t>(max_keyframes) * 2 / 3));
-  std::vector<KeyframeId> keyframes;
-  for (const auto& [count, id] : ranked) keyframes.push_back(id);
-  for (const auto& [count, id] : ranked) {
-    for (const KeyframeId neighbor : map.Covisible(id, kMaxCovisible)) {
-      if (static_cast<int>(keyframes.size()) >= max_keyframes) return keyframes;
+  const auto max_num = static_cast<size_t>(max_keyframes);
+  std::vector<KeyframeId> keyframes = BestObservers(map, seen, {}, max_num * 2 / 3);
+  const size_t num_best = keyframes.size();
+  for (size_t i = 0; i < num_best; ++i) {
+    for (const KeyframeId neighbor : map.Covisible(keyframes[i], kMaxCovisible)) {
+      if (keyframes.size() >= max_num) return keyframes;
       if (std::find(keyframes.begin(), keyframes.end(), neighbor) == keyframes.end()) keyframes.push_back(neighbor);
     }
   }
@@ -35,19 +30,24 @@ std::vector<KeyframeId> LocalKeyframes(const Map& map, const TrackedFrame& frame
 
 KnownPoints LocalPoints(const MapReplica& replica, const TrackedFrame& frame, int max_keyframes) {
   const Map& map = replica.map();
-  std::vector<PointId> seen;
+  IdSet<LandmarkId> seen(map.landmarks().end_id());
+  std::vector<PointId> seen_sent;  // sorted
   for (const SeenPoint& point : frame.points) {
-    if (point.valid()) seen.push_back(point.id);
+    if (point.id.landmark.valid()) {
+      seen.Add(point.id.landmark);
+    } else if (point.valid()) {
+      seen_sent.push_back(point.id);
+    }
   }
-  std::sort(seen.begin(), seen.end());
-  const auto is_seen = [&](const PointId& point) { return std::binary_search(seen.begin(), seen.end(), point); };
+  std::sort(seen_sent.begin(), seen_sent.end());
+  const std::vector<LandmarkId> landmarks = LandmarksSeenBy(map, LocalKeyframes(map, frame, max_keyframes));
   KnownPoints points;
-  for (const LandmarkId id : LandmarksSeenBy(map, LocalKeyframes(map, frame, max_keyframes))) {
-    const PointId point{id, {}, -1};
-    if (!is_seen(point)) points.emplace_back(point, *map.FindLandmark(id));
+  points.reserve(landmarks.size());
+  for (const LandmarkId id : landmarks) {
+    if (!seen.Has(id)) points.emplace_back(PointId{id, {}, -1}, *map.FindLandmark(id));
   }
-  for (auto& [point, landmark] : replica.SentPoints()) {
-    if (!is_seen(point)) points.emplace_back(point, landmark);
+  for (const auto& [point, landmark] : replica.SentPoints()) {
+    if (!std::binary_search(seen_sent.begin(), seen_sent.end(), point)) points.emplace_back(point, landmark);
   }
   return points;
 }

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "core/ids.h"
 
@@ -28,6 +30,25 @@ TEST(IdMap, FindsPutsRemovesAndWalksInOrder) {
   EXPECT_FALSE(map.Has({1}));
   EXPECT_TRUE(copy.Has({1})) << "copies are values";
   EXPECT_EQ(map.end_id(), 4);
+}
+
+TEST(IdMap, ValuesStayWhereTheyAreWhileOthersComeAndGo) {
+  IdMap<LandmarkId, std::string> map;
+  std::vector<const std::string*> places;
+  for (int64_t i = 0; i < 1000; ++i) places.push_back(&map.Put({i}, std::to_string(i)));
+  for (int64_t i = 0; i < 1000; i += 2) map.Remove({i});
+  for (int64_t i = 1000; i < 3000; ++i) map.Put({i}, std::to_string(i));
+  EXPECT_EQ(map.size(), 2500);
+  for (int64_t i = 1; i < 1000; i += 2) EXPECT_EQ(map.Find({i}), places[static_cast<size_t>(i)]);
+  map.ForEach([](LandmarkId id, const std::string& value) { EXPECT_EQ(value, std::to_string(id.value)); });
+}
+
+TEST(IdMap, ARemovedValueLetsGoOfWhatItHeld) {
+  const auto held = std::make_shared<int>(1);
+  IdMap<LandmarkId, std::shared_ptr<int>> map;
+  map.Put({0}, held);
+  map.Remove({0});
+  EXPECT_EQ(held.use_count(), 1);
 }
 
 }  // namespace

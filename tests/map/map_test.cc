@@ -146,7 +146,11 @@ TEST(Map, CovisibilityCountsSharedLandmarks) {
         if (observation.keyframe != a) ++counted[observation.keyframe];
       }
     }
-    EXPECT_EQ(counted, keyframe.covisible);
+    std::vector<CovisibleKeyframe> expected;
+    for (const auto& [b, num_shared] : counted) expected.push_back({b, num_shared});
+    EXPECT_EQ(keyframe.covisible, expected);
+    for (const KeyframeId b : {KeyframeId{0}, KeyframeId{3}, KeyframeId{99}})
+      EXPECT_EQ(map.NumShared(a, b), counted[b]);
     const std::vector<KeyframeId> ranked = map.Covisible(a, 5, 2);
     for (size_t i = 1; i < ranked.size(); ++i) EXPECT_GE(counted[ranked[i - 1]], counted[ranked[i]]);
   });

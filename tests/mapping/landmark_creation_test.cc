@@ -35,11 +35,11 @@ class PartlyKnownMap {
   Eigen::Vector3d Truth(LandmarkId id) const { return world_.point(PointOf(id)); }
   // Between the views of a landmark's two observers, and its noise, rad.
   double Parallax(LandmarkId id) const {
-    const std::vector<Observation>& seen = map().ObservationsOf(id);
+    const std::span<const Observation> seen = map().ObservationsOf(id);
     return std::acos(RayOf(seen[0]).dot(RayOf(seen[1])));
   }
   double ParallaxSigma(LandmarkId id) const {
-    const std::vector<Observation>& seen = map().ObservationsOf(id);
+    const std::span<const Observation> seen = map().ObservationsOf(id);
     return std::hypot(Seen(seen[0]).sigma_px, Seen(seen[1]).sigma_px) / world_.calibration().fx_px;
   }
   // By which the camera turned from the first keyframe to the last, rad.

@@ -81,8 +81,9 @@ TEST_F(LandmarkFusion, OfTwoWithEquallyManyObservationsTheOlderStays) {
   const std::vector<Observation> at = Chosen(&landmarks);
   const LandmarkId younger = Duplicate({landmarks[0]}, {at[0]})[0];
   Change([&](MapEditor& editor) {  // the old one keeps a single observation
-    const std::vector<Observation> observations = map().ObservationsOf(landmarks[0]);
-    for (size_t i = 1; i < observations.size(); ++i) editor.RemoveObservation(landmarks[0], observations[i]);
+    while (map().ObservationsOf(landmarks[0]).size() > 1) {
+      editor.RemoveObservation(landmarks[0], map().ObservationsOf(landmarks[0]).back());
+    }
   });
   ASSERT_EQ(map().ObservationsOf(landmarks[0]).size(), map().ObservationsOf(younger).size());
   Fuse();
@@ -93,7 +94,7 @@ TEST_F(LandmarkFusion, OfTwoWithEquallyManyObservationsTheOlderStays) {
 TEST_F(LandmarkFusion, MissingObservationsAreAddedInBothDirections) {
   std::vector<LandmarkId> landmarks;
   const std::vector<Observation> at = Chosen(&landmarks);
-  const std::vector<Observation>& observations = map().ObservationsOf(landmarks[1]);
+  const std::span<const Observation> observations = map().ObservationsOf(landmarks[1]);
   const Observation in_older = observations[observations.size() - 2];
   Change([&](MapEditor& editor) {
     editor.RemoveObservation(landmarks[0], at[0]);

@@ -108,7 +108,7 @@ TEST(MapCorrection, ClosingALoopMakesTwoPlacesOne) {
       EXPECT_NEAR(map.FindKeyframe({k})->scale, k < 4 ? 1.0 : 1.0 / away.scale, 1e-12);
     }
     EXPECT_EQ(map.FindKeyframe({7})->parent, KeyframeId{3});
-    EXPECT_GT(map.FindKeyframe({3})->covisible.at({7}), static_cast<int>(visits.loop().seen.size()) * 9 / 10);
+    EXPECT_GT(map.NumShared({3}, {7}), static_cast<int>(visits.loop().seen.size()) * 9 / 10);
     ASSERT_EQ(map.closed_loops().size(), 1U);
     EXPECT_EQ(map.closed_loops()[0].current, KeyframeId{7});
     EXPECT_EQ(map.closed_loops()[0].matched, KeyframeId{3});
@@ -192,7 +192,8 @@ TEST(MapCorrection, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
     adjustment.poses.push_back({{k}, shift(k) * planted.map().FindKeyframe({k})->world_from_camera});
   }
   const Eigen::Vector3d lift(0.0, -0.5, 0.0);
-  for (const auto& [id, position] : base.positions_in_world) adjustment.points.push_back({id, position + lift});
+  base.positions_in_world.ForEach(
+      [&](LandmarkId id, const Eigen::Vector3d& position) { adjustment.points.push_back({id, position + lift}); });
   // Meanwhile: keyframe 4 came, keyframe 2 and a landmark moved, another landmark went.
   planted.Add(4, {3});
   const LandmarkId moved = planted.map().FindKeyframe({2})->landmarks[0];
@@ -213,9 +214,9 @@ TEST(MapCorrection, AnAdjustmentIsAppliedToWhatBecameOfTheMap) {
                correction * before.FindKeyframe({k})->WorldFromKeyframe());
   }
   planted.map().landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
-    const auto in_base = base.positions_in_world.find(id);
-    if (in_base != base.positions_in_world.end() && id != moved) {
-      EXPECT_EQ(landmark.position_in_world, Eigen::Vector3d(in_base->second + lift)) << id.value;
+    const Eigen::Vector3d* in_base = base.positions_in_world.Find(id);
+    if (in_base != nullptr && id != moved) {
+      EXPECT_EQ(landmark.position_in_world, Eigen::Vector3d(*in_base + lift)) << id.value;
       return;
     }
     const int64_t oldest = before.ObservationsOf(id).front().keyframe.value;

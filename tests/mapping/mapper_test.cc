@@ -70,7 +70,7 @@ double CenterError(const Rigid3& a, const Rigid3& b) { return (a.translation - b
 double WrongShare(const Map& map, const Drive& drive) {
   int num_wrong = 0, num_all = 0;
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
-    const std::vector<Observation>& observations = map.ObservationsOf(id);
+    const std::span<const Observation> observations = map.ObservationsOf(id);
     for (const Observation& observation : observations) {
       num_wrong += drive.PointOf(observation) != drive.PointOf(observations.front()) ? 1 : 0;
       ++num_all;

@@ -141,7 +141,7 @@ TEST_F(LocalAdjustment, LandmarksThatFewSeeFollowThePosesAndDontMoveThem) {
   Plant(SensorType::kMono);
   std::vector<LandmarkId> few;
   map().landmarks().ForEach([&](LandmarkId id, const Landmark&) {
-    const std::vector<Observation>& seen = map().ObservationsOf(id);
+    const std::span<const Observation> seen = map().ObservationsOf(id);
     if (seen.size() == 2 && seen.back().keyframe == KeyframeId{9}) few.push_back(id);
   });
   ASSERT_GT(few.size(), 10U);

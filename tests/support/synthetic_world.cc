@@ -144,7 +144,7 @@ size_t PlantedMap::PointOf(const Observation& seen) const {
 int PlantedMap::NumMixed(const Map& map) const {
   int num_mixed = 0;
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {
-    const std::vector<Observation>& seen = map.ObservationsOf(id);
+    const std::span<const Observation> seen = map.ObservationsOf(id);
     num_mixed += std::any_of(seen.begin(), seen.end(),
                              [&](const Observation& o) { return PointOf(o) != PointOf(seen.front()); });
   });
