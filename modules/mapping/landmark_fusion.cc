@@ -21,16 +21,14 @@ int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const Vi
   const double radius_px = options.radius_px * LevelScale(expected->level);
   int32_t best = -1;
   int best_distance = options.max_hamming + 1;
-  grid.VisitWindow(expected->pixel_px, radius_px, [&](int32_t i) {
-    const auto index = static_cast<size_t>(i);
-    const int level = keyframe.features->keypoints[index].level;
-    if (level < expected->level - 1 || level > expected->level) return;
-    const int distance = HammingDistance(landmark.descriptor, keyframe.features->descriptors[index]);
+  grid.VisitWindow(expected->pixel_px, radius_px, [&](const PlacedKeypoint& placed) {
+    if (placed.level < expected->level - 1 || placed.level > expected->level) return;
+    const int distance = HammingDistance(landmark.descriptor, keyframe.features->descriptors[Index(placed.index)]);
     if (distance >= best_distance) return;
-    const PixelObservation seen = SeenAt(*keyframe.features, i);
+    const PixelObservation seen = SeenAt(*keyframe.features, placed.index);
     const Eigen::Vector3d residual = ReprojectionResidual(view.calibration, baseline_m, point_in_camera, seen);
     if (residual.squaredNorm() > Chi2Limit(seen.has_right())) return;
-    best = i;
+    best = placed.index;
     best_distance = distance;
   });
   return best;
@@ -43,8 +41,8 @@ void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, co
   const FeatureGrid grid = MakeGrid(*keyframe.features);
   const View view(keyframe.features->calibration, keyframe.world_from_camera);
   for (const LandmarkId id : landmarks) {
-    const Landmark* landmark = map.FindLandmark(id);
-    if (landmark == nullptr || map.IsSeenBy(id, target)) continue;
+    const ObservedLandmark* landmark = map.landmarks().Find(id);
+    if (landmark == nullptr || landmark->IsSeenBy(target)) continue;
     const int32_t keypoint = BestKeypoint(keyframe, grid, view, *landmark, options);
     if (keypoint < 0) continue;
     const LandmarkId other = keyframe.landmarks[static_cast<size_t>(keypoint)];
@@ -52,7 +50,7 @@ void ProjectInto(KeyframeId target, const std::vector<LandmarkId>& landmarks, co
       editor.AddObservation(id, {target, keypoint});
       continue;
     }
-    const size_t num_own = map.ObservationsOf(id).size(), num_other = map.ObservationsOf(other).size();
+    const size_t num_own = landmark->observations.size(), num_other = map.ObservationsOf(other).size();
     const bool keeps_own = num_own > num_other || (num_own == num_other && id < other);
     editor.MergeLandmarks(keeps_own ? other : id, keeps_own ? id : other);
   }

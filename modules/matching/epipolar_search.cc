@@ -40,17 +40,11 @@ EpipolarSearch::EpipolarSearch(const FeatureFrame& first, const FeatureFrame& se
       roll_(RollBetween(second_from_first_)),
       max_inverse_depth_(1.0 / min_depth),
       min_parallax_of_turn_(options.min_parallax_per_turn * AngleOf(second_from_first_)),
-      is_free_(std::move(is_free)) {
+      is_free_(std::move(is_free)),
+      grid_(second_.keypoints, calibration_.width_px, calibration_.height_px, is_free_) {
   for (int level = 0; level < kMaxLevels; ++level) {
     limits_px_[static_cast<size_t>(level)] = std::sqrt(kChi2LimitOfOne) * LevelScale(level);
   }
-  std::vector<Keypoint> keypoints;
-  for (int32_t i = 0; i < static_cast<int32_t>(second_.keypoints.size()); ++i) {
-    if (!is_free_(i)) continue;
-    keypoints.push_back(second_.keypoints[Index(i)]);
-    free_.push_back(i);
-  }
-  grid_ = FeatureGrid(keypoints, calibration_.width_px, calibration_.height_px);
 }
 
 // A disparity d +- 3 sigma stands for inverse depths (d +- 3 sigma) / (fx baseline).
@@ -93,23 +87,21 @@ std::optional<int32_t> EpipolarSearch::BestOnLine(int32_t keypoint, const PixelO
   int32_t best = -1;
   Eigen::Vector2d best_px = Eigen::Vector2d::Zero();
   const double margin_px = limits_px_[static_cast<size_t>(std::min(kTopLevel, from.level + 2))];
-  grid_.VisitSegment(a, b, margin_px, [&](int32_t number) {
-    const int32_t candidate = free_[Index(number)];
-    const Keypoint& to = second_.keypoints[Index(candidate)];
-    if (!is_free_(candidate) || std::abs(int{to.level} - int{from.level}) > 2) return;
-    const Eigen::Vector2d offset = Eigen::Vector2d(to.x_px, to.y_px) - a;
+  grid_.VisitSegment(a, b, margin_px, [&](const PlacedKeypoint& to) {
+    if (std::abs(int{to.level} - int{from.level}) > 2) return;
+    const double x_px = static_cast<double>(to.x_px) - a.x(), y_px = static_cast<double>(to.y_px) - a.y();
     const double limit = limits_px_[std::min<size_t>(to.level, kMaxLevels - 1)];
-    const double along_px = unit.dot(offset), aside_px = unit.x() * offset.y() - unit.y() * offset.x();
+    const double along_px = unit.x() * x_px + unit.y() * y_px, aside_px = unit.x() * y_px - unit.y() * x_px;
     if (std::abs(aside_px) > limit || along_px < -limit || along_px > length + limit) return;
-    if (!AreAnglesNear(from.angle, to.angle, roll_)) return;
-    const int distance = HammingDistance(descriptor, second_.descriptors[Index(candidate)]);
+    if (!AreAnglesNear(from.angle, to.angle, roll_) || !is_free_(to.index)) return;
+    const int distance = HammingDistance(descriptor, second_.descriptors[Index(to.index)]);
     const Eigen::Vector2d to_px(to.x_px, to.y_px);
     // The same corner found on another level is not a second candidate.
     const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
     if (distance < best_distance) {
       if (is_elsewhere && best >= 0) second_distance = best_distance;
       best_distance = distance;
-      best = candidate;
+      best = to.index;
       best_px = to_px;
     } else if (is_elsewhere && distance < second_distance) {
       second_distance = distance;

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <vector>
 
 #include "core/result.h"
 #include "features/feature_types.h"
@@ -76,8 +75,7 @@ class EpipolarSearch {
   const double min_parallax_of_turn_;         // rad
   std::array<double, kMaxLevels> limits_px_;  // by level: how far from the line a keypoint may lie
   const std::function<bool(int32_t)> is_free_;
-  std::vector<int32_t> free_;  // keypoints of the second view that were free at first
-  FeatureGrid grid_;           // of these, by their number in free_
+  const FeatureGrid grid_;  // of the keypoints of the second view that were free at first
 };
 
 }  // namespace tessera

@@ -10,9 +10,9 @@ std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::
   for (int i = 0; i < first.size(); ++i) {
     const int level = first.keypoint(i).level;
     BestMatch best;
-    second.grid().VisitWindow(centers_px[static_cast<size_t>(i)], radius_px, [&](int32_t j) {
-      if (std::abs(second.keypoint(j).level - level) <= 1) {
-        best.Offer(j, HammingDistance(first.descriptor(i), second.descriptor(j)));
+    second.grid().VisitWindow(centers_px[static_cast<size_t>(i)], radius_px, [&](const PlacedKeypoint& to) {
+      if (std::abs(to.level - level) <= 1) {
+        best.Offer(to.index, HammingDistance(first.descriptor(i), second.descriptor(to.index)));
       }
     });
     if (best.IsClear(options)) {

@@ -16,10 +16,11 @@ class Claims {
   explicit Claims(size_t num_keypoints) : distances_(num_keypoints, 257) {}
 
   // The lower distance wins; of equals the first.
-  void Claim(int32_t keypoint, int distance, SeenPoint point, std::vector<SeenPoint>& points) {
+  void Claim(int32_t keypoint, int distance, const PointId& id, const Landmark& landmark,
+             std::vector<SeenPoint>& points) {
     if (distance < distances_[Index(keypoint)]) {
       distances_[Index(keypoint)] = distance;
-      points[Index(keypoint)] = std::move(point);
+      points[Index(keypoint)] = {id, landmark};
     }
   }
 
@@ -70,23 +71,23 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
     const Keypoint& from = last.view->keypoint(static_cast<int>(i));
     int best_distance = options.max_hamming + 1;
     int32_t best = -1;
-    frame.view->grid().VisitWindow(pixel, radius_px * LevelScale(from.level), [&](int32_t candidate) {
-      const Keypoint& to = frame.view->keypoint(candidate);
+    frame.view->grid().VisitWindow(pixel, radius_px * LevelScale(from.level), [&](const PlacedKeypoint& to) {
       if (std::abs(int{to.level} - int{from.level}) > 1 || !AreAnglesNear(from.angle, to.angle, roll)) return;
       const int distance =
-          HammingDistance(last.view->descriptor(static_cast<int>(i)), frame.view->descriptor(candidate));
+          HammingDistance(last.view->descriptor(static_cast<int>(i)), frame.view->descriptor(to.index));
       if (distance < best_distance) {
         best_distance = distance;
-        best = candidate;
+        best = to.index;
       }
     });
-    if (best >= 0) claims.Claim(best, best_distance, last.points[i], frame.points);
+    if (best >= 0) claims.Claim(best, best_distance, last.points[i].id, last.points[i].landmark, frame.points);
   }
   return frame.NumPoints();
 }
 
 int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& options, TrackedFrame& frame) {
-  const std::vector<SeenPoint> before = frame.points;
+  std::vector<char> was_seeing(frame.points.size());  // by keypoint
+  for (size_t i = 0; i < was_seeing.size(); ++i) was_seeing[i] = frame.points[i].valid() ? 1 : 0;
   Claims claims(frame.points.size());
   const View view(frame.view->calibration(), frame.world_from_camera);
   for (const auto& [id, landmark] : points) {
@@ -96,9 +97,10 @@ int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& 
     const double radius = radius_px * (expected->cos_angle > 0.998 ? 0.625 : 1.0) * LevelScale(expected->level);
     int best_distance = options.max_hamming + 1, second_distance = 257, best_level = -1, second_level = -1;
     int32_t best = -1;
-    frame.view->grid().VisitWindow(expected->pixel_px, radius, [&](int32_t candidate) {
-      const int level = frame.view->keypoint(candidate).level;
-      if (before[Index(candidate)].valid() || level < expected->level - 1 || level > expected->level) return;
+    frame.view->grid().VisitWindow(expected->pixel_px, radius, [&](const PlacedKeypoint& placed) {
+      const int level = placed.level;
+      const int32_t candidate = placed.index;
+      if (level < expected->level - 1 || level > expected->level || was_seeing[Index(candidate)] != 0) return;
       if (!IsRightNear(frame.view->observation(candidate), view.calibration, *expected, radius)) return;
       const int distance = HammingDistance(landmark.descriptor, frame.view->descriptor(candidate));
       if (distance < best_distance) {
@@ -114,7 +116,7 @@ int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& 
     });
     if (best < 0) continue;
     if (best_level == second_level && best_distance > options.max_hamming_ratio * second_distance) continue;
-    claims.Claim(best, best_distance, {id, landmark}, frame.points);
+    claims.Claim(best, best_distance, id, landmark, frame.points);
   }
   return frame.NumPoints();
 }
@@ -136,7 +138,7 @@ int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, Tracke
       }
     }
     if (best_distance <= options.max_hamming / 2 && best_distance <= options.max_hamming_ratio * second_distance) {
-      claims.Claim(static_cast<int32_t>(best), best_distance, {id, landmark}, frame.points);
+      claims.Claim(static_cast<int32_t>(best), best_distance, id, landmark, frame.points);
     }
   }
   return frame.NumPoints();

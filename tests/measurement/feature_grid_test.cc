@@ -18,13 +18,13 @@ Keypoint At(float x_px, float y_px) { return {.x_px = x_px, .y_px = y_px}; }
 
 std::vector<int32_t> Window(const FeatureGrid& grid, const Eigen::Vector2d& center_px, double radius_px) {
   std::vector<int32_t> found;
-  grid.VisitWindow(center_px, radius_px, [&](int32_t i) { found.push_back(i); });
+  grid.VisitWindow(center_px, radius_px, [&](const PlacedKeypoint& placed) { found.push_back(placed.index); });
   return found;
 }
 
 std::vector<int32_t> Segment(const FeatureGrid& grid, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
   std::vector<int32_t> found;
-  grid.VisitSegment(from, to, 2.0, [&](int32_t i) { found.push_back(i); });
+  grid.VisitSegment(from, to, 2.0, [&](const PlacedKeypoint& placed) { found.push_back(placed.index); });
   return found;
 }
 
@@ -82,6 +82,23 @@ TEST(FeatureGrid, ASegmentMeetsAllKeypointsNearItAndNoneFarAway) {
   for (int32_t i = 0; i <= 20; ++i) EXPECT_THAT(found, Contains(i));
   EXPECT_THAT(found, testing::Not(Contains(21)));
   EXPECT_THAT(Segment(grid, {180, 90}, {20, 10}), testing::UnorderedElementsAreArray(found)) << "either way";
+}
+
+TEST(FeatureGrid, TakesTheKeypointsThatItIsToldTo) {
+  const FeatureGrid grid({At(50, 50), At(51, 50), At(52, 50)}, kWidth, kHeight, [](int32_t i) { return i != 1; });
+  EXPECT_THAT(Window(grid, {50, 50}, 10.0), ElementsAre(0, 2));
+}
+
+TEST(FeatureGrid, TellsWhatASearchAsksOfAKeypoint) {
+  const std::vector<Keypoint> keypoints = {{.x_px = 50.5F, .y_px = 20.0F, .level = 3, .angle = 70}};
+  const FeatureGrid grid(keypoints, kWidth, kHeight);
+  grid.VisitWindow({50, 20}, 1.0, [](const PlacedKeypoint& placed) {
+    EXPECT_EQ(placed.x_px, 50.5F);
+    EXPECT_EQ(placed.y_px, 20.0F);
+    EXPECT_EQ(placed.level, 3);
+    EXPECT_EQ(placed.angle, 70);
+  });
+  EXPECT_THAT(Window(grid, {50, 20}, 1.0), ElementsAre(0));
 }
 
 TEST(FeatureGrid, AnEmptyGridHoldsNothing) {
