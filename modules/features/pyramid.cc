@@ -9,11 +9,6 @@
 namespace tessera {
 namespace {
 
-constexpr std::array<int64_t, 13> kPowersOf5 = {1,     5,      25,      125,     625,      3125,     15625,
-                                                78125, 390625, 1953125, 9765625, 48828125, 244140625};
-constexpr std::array<int64_t, 13> kPowersOf6 = {1,      6,       36,       216,      1296,      7776,      46656,
-                                                279936, 1679616, 10077696, 60466176, 362797056, 2176782336};
-
 // One chunk of a row: 80 output pixels from 96 input pixels, as 5 vector operations of 2 x 8 output pixels, 40 apart.
 constexpr int kChunkOutput = 80;
 constexpr int kChunkInput = 96;
@@ -73,11 +68,6 @@ Interval Hull(Interval a, Interval b) {
 int LevelSize(int size, int level) {
   for (int l = 0; l < level; ++l) size = 5 * size / 6;
   return size;
-}
-
-double LevelScale(int level) {
-  const auto l = static_cast<size_t>(level);
-  return static_cast<double>(kPowersOf6[l]) / static_cast<double>(kPowersOf5[l]);
 }
 
 float LevelZeroPosition(double x, int level) { return static_cast<float>((x + 0.5) * LevelScale(level) - 0.5); }

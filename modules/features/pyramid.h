@@ -6,12 +6,27 @@
 // hundredths, rounded once. A keypoint x of level l stands at   1.2^l (x + 1/2) - 1/2   of the image.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "core/image.h"
 
 namespace tessera {
+
+// Powers, by level.
+inline constexpr std::array<int64_t, 13> kPowersOf5 = {1,     5,      25,      125,     625,      3125,     15625,
+                                                       78125, 390625, 1953125, 9765625, 48828125, 244140625};
+inline constexpr std::array<int64_t, 13> kPowersOf6 = {1,      6,       36,       216,      1296,      7776,      46656,
+                                                       279936, 1679616, 10077696, 60466176, 362797056, 2176782336};
+inline constexpr std::array<double, 13> kLevelScales = [] {
+  std::array<double, 13> scales{};
+  for (size_t l = 0; l < scales.size(); ++l) {
+    scales[l] = static_cast<double>(kPowersOf6[l]) / static_cast<double>(kPowersOf5[l]);
+  }
+  return scales;
+}();
 
 // Pixels begin .. end - 1 along one axis.
 struct Interval {
@@ -30,7 +45,7 @@ Interval Hull(Interval a, Interval b);
 int LevelSize(int size, int level);
 
 // 1.2^level
-double LevelScale(int level);
+inline double LevelScale(int level) { return kLevelScales[static_cast<size_t>(level)]; }
 
 // Level-0 position of position `x` (of a pixel's center, in pixels) of a level.
 float LevelZeroPosition(double x, int level);

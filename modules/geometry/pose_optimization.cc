@@ -22,12 +22,18 @@ struct NormalEquations {
   Vector6d gradient = Vector6d::Zero();
 };
 
-// The linearized residual of one observation: by the pose's left perturbation and by u.
+// The linearized residual of one observation, by u.
 struct LinearTerm {
   Reprojection reprojection;
-  Eigen::Matrix<double, 3, 6> by_pose;
   Eigen::Vector3d by_depth;
 };
+
+// The residual by the pose's left perturbation: d(point)/d(delta) = [I, -[point]x] for Retract.
+Eigen::Matrix<double, 3, 6> ByPose(const Reprojection& reprojection, const Eigen::Vector3d& point_in_camera) {
+  Eigen::Matrix<double, 3, 6> by_pose;
+  by_pose << reprojection.by_point, -reprojection.by_point * Skew(point_in_camera);
+  return by_pose;
+}
 
 class PoseProblem {
  public:
@@ -90,13 +96,12 @@ class PoseProblem {
   double rms_ = 0.0;
 };
 
-// d(point)/d(delta) = [I, -[point]x] for Retract's left perturbation;  d(point)/du = R depth_sigma / (1 + u s)^2.
+// d(point)/du = R depth_sigma / (1 + u s)^2
 LinearTerm PoseProblem::Linearize(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& point_in_camera,
                                   size_t i) const {
   const PoseObservation& o = observations_[i];
   LinearTerm term;
   term.reprojection = Reproject(calibration_, baseline_m_, point_in_camera, o.seen);
-  term.by_pose << term.reprojection.by_point, -term.reprojection.by_point * Skew(point_in_camera);
   const double stretch = 1.0 + depths_[i].u * depths_[i].relative_sigma;
   term.by_depth = term.reprojection.by_point * (rotation * o.depth_sigma_in_world) / (stretch * stretch);
   return term;
@@ -122,17 +127,18 @@ std::optional<Vector6d> PoseProblem::Step(const Rigid3& camera_from_world, Matri
     const Eigen::Vector3d point = InCamera(rotation, camera_from_world, i);
     if (!is_inlier_[i] || point.z() < kMinDepth) continue;
     const LinearTerm term = Linearize(rotation, point, i);
+    const Eigen::Matrix<double, 3, 6> by_pose = ByPose(term.reprojection, point);
     const Eigen::Vector3d& residual = term.reprojection.residual;
     const double u = depths_[i].u;
     const double huber = HuberWeight(residual.squaredNorm() + u * u, Chi2Limit(observations_[i].seen.has_right()));
-    const Vector6d coupling = term.by_pose.transpose() * term.by_depth;
+    const Vector6d coupling = by_pose.transpose() * term.by_depth;
     const double curvature = 1.0 + term.by_depth.squaredNorm(), gradient = term.by_depth.dot(residual) + u;
-    Matrix6d own = huber * (term.by_pose.transpose() * term.by_pose);
+    Matrix6d own = huber * (by_pose.transpose() * by_pose);
     own.noalias() -= (huber / curvature) * (coupling * coupling.transpose());
     const double bound = Bound(own);
     equations.information += bound * own;
     equations.gradient.noalias() +=
-        (bound * huber) * (term.by_pose.transpose() * residual - (gradient / curvature) * coupling);
+        (bound * huber) * (by_pose.transpose() * residual - (gradient / curvature) * coupling);
     eliminated_.push_back({i, coupling, curvature, gradient});
   }
   known_translation_ = equations.information.topLeftCorner<3, 3>().inverse();

@@ -98,16 +98,16 @@ void RestoreScale(const BundleProblem& problem, BundleResult& result) {
 Result<> CheckObservations(const BundleProblem& problem) {
   for (size_t i = 0; i < problem.observations.size(); ++i) {
     const BundleObservation& o = problem.observations[i];
-    const std::string name = "observation " + std::to_string(i);
+    const auto name = [i] { return "observation " + std::to_string(i); };
     if (!IsIndex(o.pose, problem.poses.size()) || !IsIndex(o.point, problem.points.size())) {
-      return Failed(name + " names pose " + std::to_string(o.pose) + " and point " + std::to_string(o.point) +
+      return Failed(name() + " names pose " + std::to_string(o.pose) + " and point " + std::to_string(o.point) +
                     ", and one of them is not in the problem");
     }
     if (!(o.seen.sigma_px > 0.0)) {
-      return Failed(name + " has a sigma_px that is not positive");
+      return Failed(name() + " has a sigma_px that is not positive");
     }
     if (o.seen.has_right() && !(problem.baseline_m > 0.0)) {
-      return Failed(name + " has a right column, but baseline_m is not positive");
+      return Failed(name() + " has a right column, but baseline_m is not positive");
     }
   }
   return {};

@@ -39,7 +39,7 @@ void KeyframeDecision::Restart(const TrackedFrame& frame) {
 void KeyframeDecision::Renew(const MapReplica& replica) {
   for (PointId& point : points_) point = replica.Renew(point);
   std::erase_if(points_, [](const PointId& point) { return !point.valid(); });
-  std::sort(points_.begin(), points_.end());
+  if (!std::is_sorted(points_.begin(), points_.end())) std::sort(points_.begin(), points_.end());
 }
 
 KeyframeDecision::Seen KeyframeDecision::See(const TrackedFrame& frame, const Rigid3& world_from_reference) const {
@@ -51,7 +51,6 @@ KeyframeDecision::Seen KeyframeDecision::See(const TrackedFrame& frame, const Ri
     cosines.push_back(CosParallax(point.landmark.position_in_world, world_from_reference.translation,
                                   frame.world_from_camera.translation));
   }
-  std::sort(seen.points.begin(), seen.points.end());
   if (!cosines.empty())
     seen.median_parallax_rad = std::acos(std::clamp(OrderStatistic(std::move(cosines), 0.5), -1.0, 1.0));
   return seen;
@@ -86,6 +85,7 @@ bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_
   if (is_first) {
     first_utime_us_ = utime_us;
     points_ = std::move(seen.points);
+    std::sort(points_.begin(), points_.end());
   }
   const double min_share = frame.view->baseline_m() > 0.0 ? options_.min_share_with_depth : options_.min_share;
   const bool has_lost_sight =

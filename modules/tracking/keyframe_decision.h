@@ -56,7 +56,7 @@ class KeyframeDecision {
  private:
   // What the frame sees of the reference's points.
   struct Seen {
-    std::vector<PointId> points;  // sorted
+    std::vector<PointId> points;  // by keypoint
     double median_parallax_rad = 0.0;
   };
   Seen See(const TrackedFrame& frame, const Rigid3& world_from_reference) const;
