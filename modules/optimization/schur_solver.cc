@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "optimization/block_product.h"
 #include "optimization/bundle_costs.h"
 
 namespace tessera {
@@ -282,7 +283,7 @@ void SchurSolver::LinearizeTerm(const Term& term, size_t point, Matrix63d& w) {
   }
   const auto pose = static_cast<size_t>(term.free_pose);
   const Eigen::Matrix<double, 6, kRows> weighted_by_pose = weight * by_pose;
-  u_[pose].noalias() += weighted_by_pose.lazyProduct(by_pose.transpose());
+  AddProduct<1>(weighted_by_pose, by_pose, u_[pose]);
   g_pose_[pose].noalias() += by_pose.lazyProduct(weighted);
   w.noalias() = weighted_by_pose.lazyProduct(by_point);
 }
@@ -334,7 +335,7 @@ void SchurSolver::Reduce(double radius) {
       for (size_t l = begin; l < end; ++l) {
         const int column = terms_[l].free_pose;
         if (column < 0 || column > row) continue;
-        reduced_->At(row, column).noalias() -= y.lazyProduct(w_[l].transpose());
+        AddProduct<-1>(y, w_[l], reduced_->At(row, column));
       }
     }
   }
