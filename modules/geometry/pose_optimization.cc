@@ -130,7 +130,7 @@ std::optional<Vector6d> PoseProblem::Step(const Rigid3& camera_from_world, Matri
     const Eigen::Matrix<double, 3, 6> by_pose = ByPose(term.reprojection, point);
     const Eigen::Vector3d& residual = term.reprojection.residual;
     const double u = depths_[i].u;
-    const double huber = HuberWeight(residual.squaredNorm() + u * u, Chi2Limit(observations_[i].seen.has_right()));
+    const double huber = HuberWeight(SquaredNorm(residual) + u * u, Chi2Limit(observations_[i].seen.has_right()));
     const Vector6d coupling = by_pose.transpose() * term.by_depth;
     const double curvature = 1.0 + term.by_depth.squaredNorm(), gradient = term.by_depth.dot(residual) + u;
     Matrix6d own = huber * (by_pose.transpose() * by_pose);
@@ -171,7 +171,7 @@ int PoseProblem::Classify(const Rigid3& camera_from_world) {
     MoveDepth(i, -(term.by_depth.dot(term.reprojection.residual) + depths_[i].u) / (1.0 + term.by_depth.squaredNorm()));
     point = InCamera(rotation, camera_from_world, i);
     if (point.z() < kMinDepth) continue;
-    const double chi2 = ReprojectionResidual(calibration_, baseline_m_, point, observations_[i].seen).squaredNorm() +
+    const double chi2 = SquaredNorm(ReprojectionResidual(calibration_, baseline_m_, point, observations_[i].seen)) +
                         depths_[i].u * depths_[i].u;
     if (chi2 > Chi2Limit(has_right)) continue;
     is_inlier_[i] = 1;

@@ -76,6 +76,12 @@ inline Reprojection Reproject(const CameraCalibration& calibration, double basel
   return result;
 }
 
+// |residual|^2, number by number: a vector that was put together from single numbers a moment ago can't be loaded as
+// one without waiting for them.
+inline double SquaredNorm(const Eigen::Vector3d& residual) {
+  return residual.x() * residual.x() + residual.y() * residual.y() + residual.z() * residual.z();
+}
+
 // 95 % of observations without a gross error have a squared residual below this (chi-square, 2 or 3 degrees of
 // freedom).
 inline double Chi2Limit(bool has_right) { return has_right ? 7.815 : 5.991; }

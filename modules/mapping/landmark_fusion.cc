@@ -27,7 +27,7 @@ int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const Vi
     if (distance >= best_distance) return;
     const PixelObservation seen = SeenAt(*keyframe.features, placed.index);
     const Eigen::Vector3d residual = ReprojectionResidual(view.calibration, baseline_m, point_in_camera, seen);
-    if (residual.squaredNorm() > Chi2Limit(seen.has_right())) return;
+    if (SquaredNorm(residual) > Chi2Limit(seen.has_right())) return;
     best = placed.index;
     best_distance = distance;
   });

@@ -159,7 +159,7 @@ bool EpipolarSearch::IsConsistent(const Eigen::Vector3d& point_in_first, const P
   if (point_in_first.z() < kMinPointDepth || point_in_second.z() < kMinPointDepth) return false;
   for (const auto& [point, seen] : {std::pair(point_in_first, in_first), std::pair(point_in_second, in_second)}) {
     const Eigen::Vector3d residual = ReprojectionResidual(calibration_, baseline_m_, point, seen);
-    if (residual.squaredNorm() > Chi2Limit(seen.has_right())) return false;
+    if (SquaredNorm(residual) > Chi2Limit(seen.has_right())) return false;
   }
   // A patch twice as far away looks half as large: distance / sigma must be alike, up to one and a half levels' ratio.
   const double ratio = point_in_second.norm() / in_second.sigma_px / (point_in_first.norm() / in_first.sigma_px);

@@ -12,9 +12,11 @@
 namespace tessera {
 
 // block += a b'  or, for kSign = -1,  block -= a b'
+// Always inline, so that a loop over `b` reads `a` once.
 template <int kSign, int kDepth>
-void AddProduct(const Eigen::Matrix<double, 6, kDepth>& a, const Eigen::Matrix<double, 6, kDepth>& b,
-                Eigen::Matrix<double, 6, 6>& block) {
+[[gnu::always_inline]] inline void AddProduct(const Eigen::Matrix<double, 6, kDepth>& a,
+                                              const Eigen::Matrix<double, 6, kDepth>& b,
+                                              Eigen::Matrix<double, 6, 6>& block) {
   static_assert(kSign == 1 || kSign == -1);
 #if defined(__AVX2__) && defined(__FMA__)
   // Two columns of the block are three packs: rows 0-3 of the first, its rows 4-5 with 0-1 of the second, whose rows

@@ -55,7 +55,7 @@ std::vector<char> Classify(const BundleProblem& problem, const BundleResult& res
     if (point_in_camera.z() >= kMinDepth) {
       const Eigen::Vector3d residual =
           ReprojectionResidual(problem.calibration, problem.baseline_m, point_in_camera, o.seen);
-      is_inlier[i] = residual.squaredNorm() <= Chi2Limit(o.seen.has_right()) ? 1 : 0;
+      is_inlier[i] = SquaredNorm(residual) <= Chi2Limit(o.seen.has_right()) ? 1 : 0;
     }
   }
   return is_inlier;

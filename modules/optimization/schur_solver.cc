@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -204,7 +205,7 @@ double SchurSolver::TwiceCostOf(size_t point, const State& state) const {
     sum +=
         in_camera.z() < kMinDepth
             ? LossBehind(seen.has_right(), seen.has_right() ? 3 : 2)
-            : HuberLoss(ReprojectionResidual(problem_.calibration, problem_.baseline_m, in_camera, seen).squaredNorm(),
+            : HuberLoss(SquaredNorm(ReprojectionResidual(problem_.calibration, problem_.baseline_m, in_camera, seen)),
                         Chi2Limit(seen.has_right()));
   }
   return sum;
@@ -267,7 +268,7 @@ void SchurSolver::LinearizeTerm(const Term& term, size_t point, Matrix63d& w) {
   if (term.free_pose >= 0) w.setZero();
   if (in_camera.z() < kMinDepth) return;
   const Reprojection r = Reproject(problem_.calibration, problem_.baseline_m, in_camera, seen);
-  const double weight = HuberWeight(r.residual.squaredNorm(), Chi2Limit(kRows == 3));
+  const double weight = HuberWeight(SquaredNorm(r.residual), Chi2Limit(kRows == 3));
   const Eigen::Matrix<double, kRows, 3> by_camera = r.by_point.template topRows<kRows>();
   const Eigen::Matrix3d axes_in_camera = rotation.lazyProduct(axes_[point]);
   const Eigen::Matrix<double, kRows, 3> by_point = by_camera.lazyProduct(axes_in_camera);
@@ -275,14 +276,21 @@ void SchurSolver::LinearizeTerm(const Term& term, size_t point, Matrix63d& w) {
   v_[point].noalias() += weight * by_point.transpose().lazyProduct(by_point);
   g_point_[point].noalias() += by_point.transpose().lazyProduct(weighted);
   if (term.free_pose < 0) return;
-  Eigen::Matrix<double, 6, kRows> by_pose;  // transposed: row' * -[p]x = (p x row)'
+  Eigen::Matrix<double, 6, kRows> by_pose, weighted_by_pose;  // transposed: row' * -[p]x = (p x row)'
   for (int i = 0; i < kRows; ++i) {
-    const Eigen::Vector3d row = by_camera.row(i).transpose();
-    by_pose.col(i).template head<3>() = row;
-    by_pose.col(i).template tail<3>() = in_camera.cross(row);
+    const double x = by_camera(i, 0), y = by_camera(i, 1), z = by_camera(i, 2);
+    const std::array<double, 6> column = {x,
+                                          y,
+                                          z,
+                                          in_camera.y() * z - in_camera.z() * y,
+                                          in_camera.z() * x - in_camera.x() * z,
+                                          in_camera.x() * y - in_camera.y() * x};
+    for (int j = 0; j < 6; ++j) {
+      by_pose(j, i) = column[Index(j)];
+      weighted_by_pose(j, i) = weight * column[Index(j)];
+    }
   }
   const auto pose = static_cast<size_t>(term.free_pose);
-  const Eigen::Matrix<double, 6, kRows> weighted_by_pose = weight * by_pose;
   AddProduct<1>(weighted_by_pose, by_pose, u_[pose]);
   g_pose_[pose].noalias() += by_pose.lazyProduct(weighted);
   w.noalias() = weighted_by_pose.lazyProduct(by_point);
@@ -377,7 +385,7 @@ Eigen::Vector3d SchurSolver::RefinedPoint(size_t point, const State& state) cons
     const Eigen::Vector3d in_camera = rotation * state.positions[point] + state.poses[terms_[k].pose].translation;
     if (in_camera.z() < kMinDepth) continue;
     const Reprojection r = Reproject(problem_.calibration, problem_.baseline_m, in_camera, seen);
-    const double weight = HuberWeight(r.residual.squaredNorm(), Chi2Limit(seen.has_right()));
+    const double weight = HuberWeight(SquaredNorm(r.residual), Chi2Limit(seen.has_right()));
     const Eigen::Matrix3d axes_in_camera = rotation.lazyProduct(axes);
     const Eigen::Matrix3d by_point = r.by_point.lazyProduct(axes_in_camera);
     v.noalias() += weight * by_point.transpose().lazyProduct(by_point);
