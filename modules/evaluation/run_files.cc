@@ -73,11 +73,8 @@ Json ToJson(const std::optional<Statistics>& statistics) {
   if (!statistics) {
     return nullptr;
   }
-  return {{"mean", statistics->mean},
-          {"median", statistics->median},
-          {"p95", statistics->p95},
-          {"p99", statistics->p99},
-          {"max", statistics->max}};
+  return {{"count", statistics->count}, {"mean", statistics->mean}, {"median", statistics->median},
+          {"p95", statistics->p95},     {"p99", statistics->p99},   {"max", statistics->max}};
 }
 
 Json ToJson(const std::vector<PartRecord>& parts) {

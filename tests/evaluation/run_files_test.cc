@@ -177,6 +177,7 @@ TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
   EXPECT_DOUBLE_EQ(json["map_wait_ms"]["mean"], 2.0);
   EXPECT_DOUBLE_EQ(json["pose_time_ms"]["median"], 4.0);
   EXPECT_DOUBLE_EQ(json["latency_ms"]["max"], 18.0);
+  EXPECT_EQ(json["stage_ms"]["tracker"]["count"], 3);
   EXPECT_EQ(json["stage_ms"]["tracker"]["p95"], 4.0);
   EXPECT_FALSE(json["stage_ms"].contains("extractor_0"));  // it has no step yet
   EXPECT_EQ(json["messages_repaired"], 7);
