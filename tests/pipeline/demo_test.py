@@ -9,7 +9,8 @@ import pytest
 
 from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera
 from tessera_cli.cli.commands.demo import NUM_FRAMES as DEMO_FRAMES
-from tessera_cli.cli.commands.demo import RENDERED_BY, log_name
+from tessera_cli.cli.commands.demo import log_name
+from tessera_cli.simulator import RENDERED_BY
 
 FRAMES = 60
 

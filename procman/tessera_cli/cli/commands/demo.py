@@ -3,7 +3,6 @@
 The log is kept and used again. Its name holds what was rendered and a hash of the sources that rendered it.
 """
 
-import hashlib
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from tessera_cli.cli.parsing import Commands, add_command, whole_number
 from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT, absolute
+from tessera_cli.simulator import simulator_hash
 
 if TYPE_CHECKING:
     from tessera_cli.runs.run_folder import Result
@@ -21,20 +21,6 @@ SCENE = "street-short"
 SENSOR = "stereo"
 # Of sim:street-short: once around the block and some 40 m of it again.
 NUM_FRAMES = 593
-# Everything that a frame passes through on its way into a log.
-RENDERED_BY = (
-    "lcmtypes",
-    "modules/core",
-    "modules/geometry",
-    "modules/simulation",
-    "modules/datasets",
-    "modules/messages",
-    "modules/wire",
-    "modules/streams",
-    "modules/runtime",
-    "modules/stages/camera",
-)
-SUFFIXES = (".cc", ".h", ".lcm")
 
 
 def add_parser(commands: Commands) -> None:
@@ -85,17 +71,7 @@ def _present(result: "Result", folder: Path) -> str:
 
 
 def log_name(num_frames: int) -> str:
-    return f"demo-{SCENE}-{SENSOR}-{num_frames}-{_simulator_hash()}.lcmlog"
-
-
-def _simulator_hash() -> str:
-    """Another simulator renders other bytes."""
-    digest = hashlib.sha256()
-    for top in RENDERED_BY:
-        for path in sorted((ROOT / top).rglob("*")):
-            if path.suffix in SUFFIXES:
-                digest.update(f"{path.relative_to(ROOT)}\0".encode() + path.read_bytes())
-    return digest.hexdigest()[:12]
+    return f"demo-{SCENE}-{SENSOR}-{num_frames}-{simulator_hash()}.lcmlog"
 
 
 def _render(log: Path, num_frames: int) -> None:
@@ -108,6 +84,6 @@ def _render(log: Path, num_frames: int) -> None:
     arguments = parse_arguments(["record", source, str(log), "--sensor", SENSOR, "--frames", f"0:{num_frames}"])
     record(arguments, parse_source(source), log, keep_interrupted=False)
     for stale in log.parent.glob(f"demo-{SCENE}-{SENSOR}-*.lcmlog"):
-        if not stale.name.endswith(f"-{_simulator_hash()}.lcmlog"):
+        if not stale.name.endswith(f"-{simulator_hash()}.lcmlog"):
             say(f"removing {stale.name}, which was rendered by an older simulator")
             stale.unlink()

@@ -1,0 +1,30 @@
+"""Which simulator renders: logs of simulated drives are kept, and used again while it stays the same."""
+
+import hashlib
+
+from tessera_cli.files import ROOT
+
+# Everything that a frame passes through on its way into a log.
+RENDERED_BY = (
+    "lcmtypes",
+    "modules/core",
+    "modules/geometry",
+    "modules/simulation",
+    "modules/datasets",
+    "modules/messages",
+    "modules/wire",
+    "modules/streams",
+    "modules/runtime",
+    "modules/stages/camera",
+)
+SUFFIXES = (".cc", ".h", ".lcm")
+
+
+def simulator_hash() -> str:
+    """Another simulator renders other bytes."""
+    digest = hashlib.sha256()
+    for top in RENDERED_BY:
+        for path in sorted((ROOT / top).rglob("*")):
+            if path.suffix in SUFFIXES:
+                digest.update(f"{path.relative_to(ROOT)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:12]
