@@ -6,17 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from tessera_cli.files import write_text
 from tessera_cli.report import figures, sentences
 from tessera_cli.report.drawing import in_order
+from tessera_cli.report.page import write_page
 from tessera_cli.report.svg import NUM_SERIES
 from tessera_cli.runs.run_folder import Result, Summary
 from tessera_cli.runs.trajectories import TrajectoryError, length_m
 from tessera_cli.settings import DEFAULTS_PATH, Settings
 
-TEMPLATES = Path(__file__).parent / "templates"
 NOTHING = "–"
 
 
@@ -32,14 +30,9 @@ class Setting:
 
 def write_report(results: list[Result], path: Path) -> None:
     """`results`: at least one. The file is written whole or not at all."""
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    page = environment.get_template("report.html").render(
+    write_page(
+        path,
+        "report.html",
         title=_title(results),
         results=[_describe(result, index) for index, result in enumerate(results)],
         drawings=figures.draw_all(results),
@@ -47,7 +40,6 @@ def write_report(results: list[Result], path: Path) -> None:
         tiles=_tiles(results[0]),
         alone=len(results) == 1,
     )
-    write_text(path, page)
 
 
 def _title(results: list[Result]) -> str:

@@ -79,8 +79,8 @@ def process_values(by_process: dict[str, float]) -> dict[str, float]:
 
 
 def draw_cpu(results: list[Result]) -> Drawing | None:
-    return _draw_bars(
-        results,
+    return draw_bars(
+        [result.name for result in results],
         [process_values(result.summary.get("cpu_s") or {}) for result in results],
         title="CPU per process",
         axis="CPU time [s]",
@@ -91,8 +91,8 @@ def draw_cpu(results: list[Result]) -> Drawing | None:
 
 def draw_steps(results: list[Result]) -> Drawing | None:
     steps = [result.summary.get("stage_ms") or {} for result in results]
-    return _draw_bars(
-        results,
+    return draw_bars(
+        [result.name for result in results],
         [{name: step["median"] for name, step in of_stages.items()} for of_stages in steps],
         title="One step of each process",
         axis="median step [ms]",
@@ -101,34 +101,42 @@ def draw_steps(results: list[Result]) -> Drawing | None:
     )
 
 
-def _draw_bars(
-    results: list[Result], by_result: list[dict[str, float]], *, title: str, axis: str, meaning: str, note: str
+def draw_bars(
+    names: list[str],
+    by_name: list[dict[str, float]],
+    *,
+    title: str,
+    axis: str,
+    meaning: str,
+    note: str,
 ) -> Drawing | None:
-    """`by_result`: for each result the values of its processes; a result without any gets no bars."""
-    processes = in_order({name for values in by_result for name in values})
+    """`by_name`: for each of the names the values of its processes; one without any gets no bars.
+
+    `title` must be the figure's own on the page.
+    """
+    processes = in_order({process for values in by_name for process in values})
     if not processes:
         return None
-    drawn = [index for index, values in enumerate(by_result) if values]
+    drawn = [index for index, values in enumerate(by_name) if values]
     figure = new_figure(CARD[0], max(CARD[1], 50 + len(processes) * (10 + 14 * len(drawn))))
     axes = figure.subplots()
     height = 0.8 / len(drawn)
     for position, index in enumerate(drawn):
         rows = np.arange(len(processes)) + (position - (len(drawn) - 1) / 2) * height
-        values = [by_result[index].get(name, 0.0) for name in processes]
-        name = short(results[index].name)
-        bars = axes.barh(rows, values, height=height * 0.9, color=color_of(index), label=name)
+        values = [by_name[index].get(process, 0.0) for process in processes]
+        bars = axes.barh(rows, values, height=height * 0.9, color=color_of(index), label=short(names[index]))
         axes.bar_label(bars, fmt="%.1f", padding=3, color=INK, fontsize=11)
     axes.set_yticks(range(len(processes)), processes)
     axes.invert_yaxis()
     axes.set(xlabel=axis)
     axes.margins(x=0.14)
     axes.grid(axis="y", visible=False)
-    if len(results) > 1:
+    if len(names) > 1:
         add_legend(figure, 2)
     words = []
     for index in drawn:
-        figures = ", ".join(f"{name} {value:.1f}" for name, value in by_result[index].items())
-        words.append(f"{results[index].name}: {figures}")
+        figures = ", ".join(f"{name} {value:.1f}" for name, value in by_name[index].items())
+        words.append(f"{names[index]}: {figures}")
     label = f"{meaning}. {'; '.join(words)}."
     return Drawing(title, label, note, to_svg(figure, title, label))
 
