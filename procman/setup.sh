@@ -189,7 +189,8 @@ build_in() {
   local folder="$root/$1" status=0
   shift
   printf '\n== ninja %s\n' "$*" >>"$setup_log"
-  CCACHE_SLOPPINESS=pch_defines,time_macros ninja -C "$folder" -j "$(num_build_jobs)" "$@" 2>&1 </dev/null |
+  # CCACHE_BASEDIR, NOHASHDIR: what one checkout has compiled serves others, such as those that experiments build beside.
+  CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR="$root" CCACHE_NOHASHDIR=1 ninja -C "$folder" -j "$(num_build_jobs)" "$@" 2>&1 </dev/null |
     follow_ninja || status=$?
   if [ "$status" -ne 0 ]; then
     grep -E -A 12 'FAILED:|error:|ninja: error' "$setup_log" | tail -n 25 >&2
