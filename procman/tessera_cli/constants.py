@@ -45,6 +45,7 @@ OUTPUT_PERIOD_S = 0.2
 ORDER_REPEAT_S = 0.3
 STOP_POLL_S = 0.01
 RECORDING_POLL_S = 0.1
+EXPERIMENT_POLL_S = 0.1
 RUN_PANEL_PERIOD_S = 0.25
 WATCH_PANEL_PERIOD_S = 0.5
 # Between two lines where there is no terminal.
@@ -66,6 +67,8 @@ DRAIN_TIMEOUT_S = 3.0
 # After Ctrl-C a recording camera ends its stream and writes what it has to the disk.
 RECORDER_STOP_TIMEOUT_S = 60.0
 MAP_WRITER_STOP_TIMEOUT_S = 5.0
+# A run ends its stack in order, which may have to wait for a long step.
+EXPERIMENT_STOP_TIMEOUT_S = 20.0
 # A stack without any status for this long has ended.
 SILENT_STACK_S = 5.0
 

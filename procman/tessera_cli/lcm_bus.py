@@ -99,13 +99,18 @@ def listen(buses: Sequence[Bus], seconds: float) -> None:
             bus.handle_waiting()
 
 
-def log_messages(path: Path, channel: str) -> Iterator[bytes]:
-    """The data of all events of a recorded log on one channel."""
+def log_events(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Channel and data of all events of a recorded log."""
     log = lcm.EventLog(str(path), "r")
     try:
-        yield from (event.data for event in log if event.channel == channel)
+        yield from ((event.channel, event.data) for event in log)
     finally:
         log.close()
+
+
+def log_messages(path: Path, channel: str) -> Iterator[bytes]:
+    """The data of all events of a recorded log on one channel."""
+    yield from (data for name, data in log_events(path) if name == channel)
 
 
 def _explain(url: str, reason: str) -> str:

@@ -1,5 +1,6 @@
 """The message types that the build generates from lcmtypes/, and how their bytes are decoded."""
 
+import importlib
 import struct
 import sys
 from typing import Any
@@ -26,6 +27,7 @@ from tessera import (
 __all__ = [
     "camera_image_t",
     "decode",
+    "decode_as",
     "end_of_stream_t",
     "header_t",
     "heartbeat_t",
@@ -49,3 +51,9 @@ def decode(message_type: Any, data: bytes) -> Any | None:
         return message_type.decode(data)
     except _DECODE_ERRORS:
         return None
+
+
+def decode_as(type_name: str, data: bytes) -> Any | None:
+    """As `decode`, of the type of this name; None also if the build, of another commit, has no such type."""
+    message_type = getattr(importlib.import_module("tessera"), type_name, None)
+    return decode(message_type, data) if message_type else None

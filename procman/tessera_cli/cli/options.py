@@ -2,7 +2,7 @@
 
 import os
 
-from tessera_cli.cli.parsing import Parser, assignment, frames, pace, tiles, whole_number
+from tessera_cli.cli.parsing import SENSORS, Parser, assignment, frames, pace, tiles, whole_number
 from tessera_cli.constants import DEFAULT_PORT, MAX_FEATURES, MAX_INSTANCES
 
 SOURCES = """\
@@ -70,7 +70,7 @@ def add_timeout(parser: Parser, seconds: int) -> None:
 
 def add_source_options(parser: Parser) -> None:
     """Of commands that read a source."""
-    parser.add_argument("--sensor", choices=("mono", "stereo", "rgbd"), default="mono", help="default mono")
+    parser.add_argument("--sensor", choices=SENSORS, default="mono", help="default mono")
     parser.add_argument(
         "--camera", metavar="FILE.yaml", help="calibration, where the source brings none, or instead of its own"
     )

@@ -9,6 +9,7 @@ from typing import NoReturn, TypeAlias
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 # Carries out a command and returns its exit status.
 Main = Callable[[argparse.Namespace], int]
+SENSORS = ("mono", "stereo", "rgbd")
 
 
 class Parser(argparse.ArgumentParser):
@@ -30,6 +31,19 @@ def add_command(commands: Commands, name: str, main: Main, summary: str, epilog:
     )
     parser.set_defaults(main=main)
     return parser
+
+
+def add_group(commands: Commands, name: str, summary: str, epilog: str) -> Commands:
+    """A subcommand that has subcommands of its own, which are added to what is returned."""
+    parser = commands.add_parser(
+        name,
+        help=summary,
+        description=summary,
+        epilog=epilog,
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    return parser.add_subparsers(metavar="NAME", required=True, parser_class=Parser)
 
 
 def whole_number(minimum: int, maximum: int) -> Callable[[str], int]:
@@ -65,6 +79,16 @@ def frames(text: str) -> tuple[int, int]:
     if last != -1 and last <= first:
         raise argparse.ArgumentTypeError(f"holds no frame: '{text}' must have A < B")
     return first, last
+
+
+def sensor_and_source(text: str) -> tuple[str, str]:
+    """`[SENSOR=]SOURCE` as (sensor, source); a source may hold `=` too."""
+    sensor, equals, source = text.partition("=")
+    if not equals or ":" in sensor:
+        return "mono", text
+    if sensor not in SENSORS:
+        raise argparse.ArgumentTypeError(f"'{sensor}' in '{text}' must be one of {', '.join(SENSORS)}")
+    return sensor, source
 
 
 def command_count(text: str) -> tuple[str, int]:

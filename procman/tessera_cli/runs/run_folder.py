@@ -149,7 +149,7 @@ def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None
         summary=summary,
         frames=read_frames(folder / "frames.csv"),
         loops=read_loops(folder / "loops.csv"),
-        settings=_read_settings(folder / "settings.yaml"),
+        settings=read_settings(folder / "settings.yaml"),
         log_warnings=read_log_warnings(folder / "stages"),
     )
 
@@ -197,7 +197,7 @@ def _read_summary(path: Path) -> Summary:
         raise UserError(f"{path}: is no JSON ({error}).") from error
 
 
-def _read_settings(path: Path) -> Settings:
+def read_settings(path: Path) -> Settings:
     return yaml.safe_load(path.read_text()) or {} if path.is_file() else {}
 
 

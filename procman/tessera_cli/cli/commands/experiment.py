@@ -1,43 +1,112 @@
-"""tessera experiment: measurements."""
+"""tessera experiment: measurements, each a subcommand."""
 
+import os
 from argparse import Namespace
 
-from tessera_cli.cli.parsing import Commands, add_command
-from tessera_cli.errors import UserError
+from tessera_cli.cli.options import add_port
+from tessera_cli.cli.parsing import Commands, add_command, add_group, frames, sensor_and_source, whole_number
+from tessera_cli.constants import MAX_INSTANCES
+from tessera_cli.files import ROOT
+
+PERFORMANCE = """\
+Without --source: KITTI 03 mono, EuRoC MH_01 stereo, kitchen RGB-D and sim:street-short stereo; a sequence that is not
+there is left out. Simulated worlds are rendered into a log first, so that rendering does not count.
+
+The folder holds each run, the table as performance.json and performance.csv, and performance.html. An experiment that
+was interrupted continues where it stopped when the same command is given again with its --out.
+
+Exit status: 0 measured; 1 a run failed, or runs of one commit differ in their results; 2 the arguments are wrong.
+
+examples:
+  procman/tessera experiment performance --against HEAD~1
+  procman/tessera experiment performance --against f1d2cc7 --out logs/performance
+  procman/tessera experiment performance --source stereo=kitti:DIR mono=sim:street-short --frames 0:200 --repetitions 3
+"""
+SOURCES = "sources with ground truth, instead of the default"
 
 
 def add_parser(commands: Commands) -> None:
-    parser = add_command(
+    experiments = add_group(
         commands,
         "experiment",
-        main,
-        "Measurements, as a table, a CSV file and a plot under logs/.",
-        "examples:\n  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n",
+        "Measurements, as a table, a CSV file and a plot or page under logs/.",
+        "examples:\n  procman/tessera experiment performance --against HEAD~1\n"
+        "  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n",
+    )
+    _add_performance(experiments)
+    add_command(experiments, "extraction", _extraction, "Time per image, compared with cv::ORB.")
+    places = add_command(experiments, "places", _places, "Recall and precision of place recognition.")
+    places.add_argument("sources", metavar="SOURCE", nargs="*", help=SOURCES)
+    worlds = add_command(experiments, "worlds", _worlds, "How hard simulated and recorded sequences are.")
+    worlds.add_argument("sources", metavar="SOURCE", nargs="*", help=SOURCES)
+
+
+def _add_performance(experiments: Commands) -> None:
+    summary = "Speed, CPU time, accuracy and repeatability of whole runs: this checkout against another commit."
+    parser = add_command(experiments, "performance", _performance, summary, PERFORMANCE)
+    parser.add_argument(
+        "--against",
+        metavar="COMMIT|DIR",
+        help="what to compare with: a commit, which is built beside (in the user's cache folder, kept and used again), "
+        "or the folder of a built checkout; default: only this checkout is measured",
+    )
+    count = whole_number(1, 100)
+    parser.add_argument(
+        "--repetitions", type=count, metavar="N", default=5, help="runs of each sequence and commit, default 5"
     )
     parser.add_argument(
-        "name",
-        metavar="NAME",
-        choices=("extraction", "places", "worlds"),
-        help="extraction: time per image compared with cv::ORB; places: recall and precision of place recognition; "
-        "worlds: how hard simulated and recorded sequences are",
+        "--source",
+        dest="sources",
+        type=sensor_and_source,
+        metavar="SPEC",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="[mono|stereo|rgbd=]SOURCE instead of the standard sequences, default mono",
+    )
+    data = ROOT.parent / "shared" / "data"
+    parser.add_argument(
+        "--data", metavar="DIR", default=str(data), help=f"holds kitti/, euroc/ and rgbd/, default {data}"
     )
     parser.add_argument(
-        "sources", metavar="SOURCE", nargs="*", help="places, worlds: sources with ground truth, instead of the default"
+        "--frames", type=frames, metavar="A:B", default=(0, -1), help="only frames A..B-1, for a quick check"
     )
+    parser.add_argument(
+        "--extractors",
+        type=whole_number(1, MAX_INSTANCES),
+        metavar="P",
+        default=os.cpu_count() or 1,
+        help="extractor processes, default: cores of this machine",
+    )
+    parser.add_argument(
+        "--no-timeline",
+        action="store_true",
+        help="leave out the picture of a frame's way through the processes, which takes one more run of each sequence",
+    )
+    parser.add_argument("--out", metavar="DIR", help="default logs/<date-time>-experiment-performance")
+    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
+    add_port(parser)
 
 
-def main(arguments: Namespace) -> int:
-    match arguments.name:
-        case "places":
-            from tessera_cli.report.experiment_places import measure_places
+def _performance(arguments: Namespace) -> int:
+    from tessera_cli.experiments.performance import measure_performance
 
-            return measure_places(arguments.sources)
-        case "worlds":
-            from tessera_cli.report.experiment_worlds import measure_worlds
+    return measure_performance(arguments)
 
-            return measure_worlds(arguments.sources)
-    if arguments.sources:
-        raise UserError("experiment extraction takes no SOURCE: it has images of its own.")
-    from tessera_cli.report.experiment_extraction import measure_extraction
+
+def _extraction(_arguments: Namespace) -> int:
+    from tessera_cli.experiments.extraction import measure_extraction
 
     return measure_extraction()
+
+
+def _places(arguments: Namespace) -> int:
+    from tessera_cli.experiments.places import measure_places
+
+    return measure_places(arguments.sources)
+
+
+def _worlds(arguments: Namespace) -> int:
+    from tessera_cli.experiments.worlds import measure_worlds
+
+    return measure_worlds(arguments.sources)
