@@ -13,7 +13,7 @@ from helpers.page import Page
 from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera, wait_for
 from tessera_cli.supervision.process_tree import marked
 
-FRAMES = "0:40"
+FRAMES = "0:30"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -37,14 +37,15 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def first(tessera: Tessera, out: Path) -> Finished:
-    return tessera.command(*words(tessera, out), "--against", ROOT).must_end_well()
+    # Rendering, four runs and a page: on a busy machine more than any single run may take.
+    return tessera.command(*words(tessera, out), "--against", ROOT, timeout=4 * RUN_TIMEOUT_S).must_end_well()
 
 
 def test_both_sides_are_measured_and_told(first: Finished, out: Path) -> None:
     (results,) = json.loads((out / "performance.json").read_text())["sequences"]
     for side in ("this", "that"):
         (run,) = results[side]
-        assert run["frames"] == 40 and run["frames_per_s"] > 0 and run["error_m"] < 1
+        assert run["frames"] == 30 and run["frames_per_s"] > 0 and run["error_m"] < 1
         assert run["cpu_ms"]["mapper"] > 0 and run["busy_ms"]["mapper"] > 0
     rows = {row["figure"]: row for row in results["rows"]}
     assert rows["trajectory, map"]["ratio"] == "same", "equal programs give equal results"
@@ -71,7 +72,7 @@ def test_it_continues_with_what_is_missing(tessera: Tessera, first: Finished, ou
 
 
 def test_another_experiment_does_not_overwrite_it(tessera: Tessera, first: Finished, out: Path) -> None:
-    tessera.command(*words(tessera, out), "--frames", "0:41", "--against", ROOT).must_refuse(
+    tessera.command(*words(tessera, out), "--frames", "0:31", "--against", ROOT).must_refuse(
         "another frames", "--force"
     )
 
