@@ -68,26 +68,35 @@ def add_timeout(parser: Parser, seconds: int) -> None:
     )
 
 
+def add_frames(parser: Parser, remark: str = "") -> None:
+    """`remark` goes on with the help, as does that of `add_extractors`."""
+    parser.add_argument("--frames", type=frames, metavar="A:B", default=(0, -1), help="only frames A..B-1" + remark)
+
+
+def add_extractors(parser: Parser, minimum: int, remark: str = "") -> None:
+    parser.add_argument(
+        "--extractors",
+        type=whole_number(minimum, MAX_INSTANCES),
+        metavar="P",
+        default=os.cpu_count() or 1,
+        help="extractor processes, default: cores of this machine" + remark,
+    )
+
+
 def add_source_options(parser: Parser) -> None:
     """Of commands that read a source."""
     parser.add_argument("--sensor", choices=SENSORS, default="mono", help="default mono")
     parser.add_argument(
         "--camera", metavar="FILE.yaml", help="calibration, where the source brings none, or instead of its own"
     )
-    parser.add_argument("--frames", type=frames, metavar="A:B", default=(0, -1), help="only frames A..B-1")
+    add_frames(parser)
     add_settings(parser)
 
 
 def add_run_options(parser: Parser) -> None:
     """Of commands that run the whole stack."""
     add_source_options(parser)
-    parser.add_argument(
-        "--extractors",
-        type=whole_number(0, MAX_INSTANCES),
-        metavar="P",
-        default=os.cpu_count() or 1,
-        help="extractor processes, default: cores of this machine; 0: those of a running pool (procman/pool.pmd)",
-    )
+    add_extractors(parser, 0, "; 0: those of a running pool (procman/pool.pmd)")
     parser.add_argument(
         "--prefix",
         metavar="TEXT",

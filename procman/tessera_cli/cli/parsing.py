@@ -21,21 +21,19 @@ class Parser(argparse.ArgumentParser):
 
 def add_command(commands: Commands, name: str, main: Main, summary: str, epilog: str = "") -> Parser:
     """A subcommand. `epilog` ends its help, with examples."""
-    parser = commands.add_parser(
-        name,
-        help=summary,
-        description=summary,
-        epilog=epilog,
-        allow_abbrev=False,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = _add_parser(commands, name, summary, epilog)
     parser.set_defaults(main=main)
     return parser
 
 
 def add_group(commands: Commands, name: str, summary: str, epilog: str) -> Commands:
     """A subcommand that has subcommands of its own, which are added to what is returned."""
-    parser = commands.add_parser(
+    parser = _add_parser(commands, name, summary, epilog)
+    return parser.add_subparsers(metavar="NAME", required=True, parser_class=Parser)
+
+
+def _add_parser(commands: Commands, name: str, summary: str, epilog: str) -> Parser:
+    return commands.add_parser(
         name,
         help=summary,
         description=summary,
@@ -43,7 +41,6 @@ def add_group(commands: Commands, name: str, summary: str, epilog: str) -> Comma
         allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    return parser.add_subparsers(metavar="NAME", required=True, parser_class=Parser)
 
 
 def whole_number(minimum: int, maximum: int) -> Callable[[str], int]:

@@ -1,11 +1,9 @@
 """tessera experiment: measurements, each a subcommand."""
 
-import os
 from argparse import Namespace
 
-from tessera_cli.cli.options import add_port
-from tessera_cli.cli.parsing import Commands, add_command, add_group, frames, sensor_and_source, whole_number
-from tessera_cli.constants import MAX_INSTANCES
+from tessera_cli.cli.options import add_extractors, add_frames, add_port
+from tessera_cli.cli.parsing import Commands, add_command, add_group, sensor_and_source, whole_number
 from tessera_cli.files import ROOT
 
 PERFORMANCE = """\
@@ -68,16 +66,8 @@ def _add_performance(experiments: Commands) -> None:
     parser.add_argument(
         "--data", metavar="DIR", default=str(data), help=f"holds kitti/, euroc/ and rgbd/, default {data}"
     )
-    parser.add_argument(
-        "--frames", type=frames, metavar="A:B", default=(0, -1), help="only frames A..B-1, for a quick check"
-    )
-    parser.add_argument(
-        "--extractors",
-        type=whole_number(1, MAX_INSTANCES),
-        metavar="P",
-        default=os.cpu_count() or 1,
-        help="extractor processes, default: cores of this machine",
-    )
+    add_frames(parser, ", for a quick check")
+    add_extractors(parser, 1)
     parser.add_argument(
         "--no-timeline",
         action="store_true",
