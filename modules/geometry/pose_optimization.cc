@@ -204,12 +204,11 @@ PoseOptimizationResult OptimizePose(const CameraCalibration& calibration, double
       const std::optional<Vector6d> step = problem.Step(result.camera_from_world, &result.information);
       if (!step) break;
       result.camera_from_world = Retract(result.camera_from_world, *step);
-      if (step->norm() < options.min_step) break;
+      if (step->dot(result.information * *step) < options.min_step_sigmas * options.min_step_sigmas) break;
     }
+    const std::vector<char> before = problem.is_inlier();
     result.num_inliers = problem.Classify(result.camera_from_world);
-    if (result.num_inliers < kMinInliers) {
-      break;
-    }
+    if (result.num_inliers < kMinInliers || problem.is_inlier() == before) break;
   }
   result.rms = problem.rms();
   result.is_inlier = std::move(problem.is_inlier());

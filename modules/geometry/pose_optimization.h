@@ -31,9 +31,9 @@ struct PosePrior {
 inline constexpr double kMaxLeverage = 0.02;
 
 struct PoseOptimizationOptions {
-  int num_rounds = 4;      // after each, observations are sorted anew into inliers and outliers
-  int max_iterations = 5;  // Gauss-Newton steps a round; they converge in 2 to 4 from a fair start
-  double min_step = 1e-9;  // a smaller step (meters and radians, norm) ends the round
+  int num_rounds = 4;             // after each, observations are sorted anew; one that changes none is the last
+  int max_iterations = 5;         // Gauss-Newton steps a round; they converge in 2 to 4 from a fair start
+  double min_step_sigmas = 1e-3;  // a smaller step, by what the observations know of it, ends the round
 };
 
 struct PoseOptimizationResult {

@@ -168,6 +168,26 @@ Eigen::Matrix<double, 6, 6> InformationOfPoints(double depth, double relative_si
   return OptimizePose(MakeCamera(), 0.0, observations, {}, {}).information;
 }
 
+// What more iterations would change is far below what the observations know.
+TEST(OptimizePose, EndsWithinAHundredthOfASigma) {
+  const Rigid3 truth{ExpSO3({0.02, -0.1, 0.03}), {0.4, -0.2, 0.6}};
+  std::mt19937_64 generator(11);
+  std::normal_distribution<double> noise_px(0.0, 1.0);
+  std::vector<PoseObservation> observations;
+  for (const Eigen::Vector3d& point : MakePoints(Scene::kGeneral, truth, 300)) {
+    observations.push_back({.point_in_world = point, .seen = SeePoint(truth * point, false)});
+    observations.back().seen.pixel_px += Eigen::Vector2d(noise_px(generator), noise_px(generator));
+  }
+  const PoseOptimizationOptions exhaustive{.max_iterations = 100, .min_step_sigmas = 0.0};
+  const PoseOptimizationResult result = OptimizePose(MakeCamera(), kViewBaseline, observations, truth, {});
+  const PoseOptimizationResult limit = OptimizePose(MakeCamera(), kViewBaseline, observations, truth, exhaustive);
+  ASSERT_EQ(result.is_inlier, limit.is_inlier);
+  const Rigid3 rest = limit.camera_from_world * result.camera_from_world.Inverse();
+  Eigen::Matrix<double, 6, 1> step;
+  step << rest.translation, LogSO3(rest.rotation);
+  EXPECT_LT(std::sqrt(step.dot(result.information * step)), 0.01);
+}
+
 TEST(OptimizePose, AFarPointHoldsTheRotationAndSaysLittleOfTheTranslation) {
   const Eigen::Matrix<double, 6, 6> near = InformationOfPoints(5.0, 0.02), far = InformationOfPoints(500.0, 1.0);
   for (int axis = 3; axis < 6; ++axis) EXPECT_GT(far(axis, axis), 0.9 * near(axis, axis)) << axis;
