@@ -72,7 +72,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
     result.pose.is_relocalized = before == State::kLost || is_answered;
     result.pose.state = TrackingState::kTracked;
     if (options_.makes_keyframes && IsKeyframeDue()) {
-      if (view->baseline_m() == 0.0) AddScaleDrift(last_->reference_from_camera);
+      if (view->baseline_m() == 0.0) WatchScale(last_->reference_from_camera);
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
     }
   } else if (before == State::kTracking && search && FollowPair(*search, result.keyframes)) {
@@ -121,6 +121,7 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
   result.pose.num_inliers = last_->frame.NumPoints();
   result.pose.is_keyframe = !result.keyframes.empty();
   result.pose.is_step_doubtful = last_->evidence == StepEvidence::kContradictory;
+  result.pose.scale_sigma = scale_.RecentDrift(result.pose.utime_us);
 }
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
@@ -144,7 +145,7 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   std::optional<MonoStart> start = initializer_.Add(view);
   if (!start) return false;
   initializer_ = MonoInitializer(options_.start);
-  scale_variance_ = 0.0;
+  scale_.Restart();
   TakeOverMotion(*start);
   const KeyframeId first_id = next_keyframe_;
   TrackedFrame first(start->first), second(start->second);
@@ -345,7 +346,7 @@ bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation
   const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
   if (interval_s > 0.0) motion_.Add(reference_from_camera, covariance, interval_s, true);
   last_.emplace(Last{std::move(frame), reference_from_camera, StepEvidence::kWeak, covariance, std::nullopt, true});
-  AddScaleDrift(reference_from_camera);
+  WatchScale(reference_from_camera);
   keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
   return true;
 }
@@ -403,11 +404,9 @@ void MapTracker::LearnReadout(const TrackedFrame& frame) {
   readout_.Add(frame, *camera_motion_, {world_from_reference->Pose(), *camera_motion_at_reference_});
 }
 
-void MapTracker::AddScaleDrift(const Rigid3& reference_from_camera) {
+void MapTracker::WatchScale(const Rigid3& reference_from_camera) {
   const Eigen::Vector3d step = reference_from_camera.rotation.inverse() * reference_from_camera.translation;
-  const double squared = step.squaredNorm();
-  const double variance = step.dot(last_->covariance * step) / (squared * squared);  // of the logarithm of its length
-  if (variance > 0.0 && std::isfinite(variance)) scale_variance_ += variance;
+  scale_.Add(last_->frame.view->features().utime_us, step, last_->covariance);
 }
 
 void MapTracker::ResetMotion() {

@@ -23,6 +23,7 @@
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
 #include "tracking/readout_estimator.h"
+#include "tracking/scale_watch.h"
 
 namespace tessera {
 
@@ -67,13 +68,9 @@ class MapTracker {
   KeyframeId last_keyframe() const { return {next_keyframe_.value - 1}; }
 
   const Map& map() const { return replica_.map(); }
-  // Mono: by how much the scale may have drifted since this part of the map began, as a share (a standard deviation,
-  // without regard to loops): the errors of the steps from keyframe to keyframe, along them, taken as independent,
-  //
-  //   drift^2 = sum over keyframes of (sigma_step / |step|)^2
-  //
-  // 0 where depth is measured.
-  double scale_drift() const { return std::sqrt(scale_variance_); }
+  // Mono: by how much the scale may have drifted since this part of the map began (ScaleWatch::drift). 0 where depth is
+  // measured.
+  double scale_drift() const { return scale_.drift(); }
 
  private:
   using Frame = std::shared_ptr<const FrameView>;
@@ -134,7 +131,7 @@ class MapTracker {
   void ResetMotion();
   std::optional<Drift> DriftNow() const;
   void TakeOverMotion(MonoStart& start);
-  void AddScaleDrift(const Rigid3& reference_from_camera);
+  void WatchScale(const Rigid3& reference_from_camera);
   bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   void Remember(TrackedFrame frame, const FramePose& pose, bool is_wide_step);
@@ -160,7 +157,7 @@ class MapTracker {
       reference_frame_;            // mono: as it was when it became a keyframe; nullopt: it is the map's alone
   Rigid3 world_from_start_;        // camera where the next part of the map begins
   std::optional<Drift> drift_;     // of the last loss
-  double scale_variance_ = 0.0;    // of the logarithm of the scale
+  ScaleWatch scale_;               // mono
   int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last

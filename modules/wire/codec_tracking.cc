@@ -85,12 +85,14 @@ struct Layout<pose_t> {
     fields(message.is_keyframe, pose.is_keyframe);
     fields(message.is_relocalized, pose.is_relocalized);
     fields(message.is_step_doubtful, pose.is_step_doubtful);
+    fields(message.scale_sigma, pose.scale_sigma);
     fields(message.relocalized_by, pose.relocalized_by);
     fields.Count(message.num_deltas, pose.num_deltas);
     fields(message.is_live, pose.is_live);
     fields.Count(message.map_wait_us, pose.map_wait_us);
     fields.Check(pose.frame.valid(), "its frame number is negative");
     fields.Check(pose.relocalized_by <= pose.frame, "the frame that it was relocalized by is newer");
+    fields.Check(pose.scale_sigma >= 0.0, "the deviation of its scale is negative");
   }
 };
 TESSERA_CODEC(PoseEstimate, pose_t);

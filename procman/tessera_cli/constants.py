@@ -35,6 +35,10 @@ NUM_OLD_LOG_FILES = 3
 # More extractors than this are shown as one, in the live panel and in reports.
 MAX_EXTRACTORS_SHOWN = 4
 
+# Of the logarithm of mono's scale, what the images of the last seconds leave open: from here on it may have slipped.
+# On ordinary sequences it stays below 0.1.
+MAX_SCALE_SIGMA = 0.25
+
 # --- Periods, in seconds unless the name says otherwise -----------------------------------------------------------
 # One turn of a loop that waits for messages.
 LISTEN_S = 0.05

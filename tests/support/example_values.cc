@@ -501,6 +501,7 @@ PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
           .is_keyframe = Draw(generator, 0, 1) == 1,
           .is_relocalized = Draw(generator, 0, 1) == 1,
           .is_step_doubtful = Draw(generator, 0, 1) == 1,
+          .scale_sigma = 0.01 * Draw(generator, 0, 300),
           .relocalized_by = {Draw(generator, -1, 99)},
           .num_deltas = Draw(generator, 0, 99),
           .is_live = Draw(generator, 0, 1) == 1,
@@ -513,8 +514,9 @@ bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_features == b.num_features &&
          a.num_matches == b.num_matches && a.num_inliers == b.num_inliers && a.num_landmarks == b.num_landmarks &&
          a.is_keyframe == b.is_keyframe && a.is_relocalized == b.is_relocalized &&
-         a.is_step_doubtful == b.is_step_doubtful && a.relocalized_by == b.relocalized_by &&
-         a.num_deltas == b.num_deltas && a.is_live == b.is_live && a.map_wait_us == b.map_wait_us;
+         a.is_step_doubtful == b.is_step_doubtful && a.scale_sigma == b.scale_sigma &&
+         a.relocalized_by == b.relocalized_by && a.num_deltas == b.num_deltas && a.is_live == b.is_live &&
+         a.map_wait_us == b.map_wait_us;
 }
 
 template <>

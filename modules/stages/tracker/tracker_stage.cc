@@ -99,6 +99,7 @@ void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {
   pose.map_wait_us = wait_.End(began_us);
   poses_.Publish(pose);
   context_.SetValue("state", static_cast<double>(pose.state));
+  context_.SetValue("scale_sigma", pose.scale_sigma);
   context_.SetValue("map_wait_s", 1e-6 * static_cast<double>(wait_.total_us()));
 }
 

@@ -75,6 +75,7 @@ class Frames:
     landmarks: np.ndarray  # in the tracker's copy of the map
     is_keyframe: np.ndarray  # bool
     is_step_doubtful: np.ndarray  # bool: the images contradict the motion of a moment before
+    scale_sigma: np.ndarray  # mono: what the images left open of ln(scale) in the last seconds
     numbers: np.ndarray
 
 
@@ -229,6 +230,7 @@ def read_frames(path: Path) -> Frames | None:
             landmarks=column("landmarks"),
             is_keyframe=column("is_keyframe") > 0,
             is_step_doubtful=column("is_step_doubtful") > 0,
+            scale_sigma=column("scale_sigma"),
             numbers=column("frame").astype(int),
         )
     except (KeyError, ValueError) as error:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tessera_cli.constants import MAX_SCALE_SIGMA
 from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
 from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run
@@ -93,29 +96,49 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
-    """A sentence for each stretch of frames whose images contradict how the camera moved a moment before.
+    """A sentence for each stretch of frames after which the map may lie on another scale, in their order.
 
-    Frames no more than MAX_GAP_FRAMES apart belong together.
+    The images contradict how the camera moved a moment before, or leave open how far it went.
     """
     if frames is None:
         return []
+    contradicted = [(stretch[0], _contradiction(stretch, sensor)) for stretch in _stretches(frames, "contradicted")]
+    open_scale = [(stretch[0], _open_scale(frames, stretch)) for stretch in _stretches(frames, "open")]
+    return [sentence for _, sentence in sorted(contradicted + open_scale)]
+
+
+def _stretches(frames: Frames, doubt: str) -> list[list[int]]:
+    """The numbers of frames in doubt; those no more than MAX_GAP_FRAMES apart belong together."""
+    in_doubt = frames.is_step_doubtful if doubt == "contradicted" else frames.scale_sigma > MAX_SCALE_SIGMA
     stretches: list[list[int]] = []
-    for number in frames.numbers[frames.is_step_doubtful]:
+    for number in frames.numbers[in_doubt]:
         if stretches and number - stretches[-1][-1] <= MAX_GAP_FRAMES:
             stretches[-1].append(int(number))
         else:
             stretches.append([int(number)])
-    return [_doubt_of(stretch, sensor) for stretch in stretches]
+    return stretches
 
 
-def _doubt_of(stretch: list[int], sensor: str) -> str:
-    where = f"at frame {stretch[0]}" if len(stretch) == 1 else f"between frames {stretch[0]} and {stretch[-1]}"
+def _where(stretch: list[int]) -> str:
+    return f"at frame {stretch[0]}" if len(stretch) == 1 else f"between frames {stretch[0]} and {stretch[-1]}"
+
+
+def _contradiction(stretch: list[int], sensor: str) -> str:
     times = "once" if len(stretch) == 1 else f"{len(stretch)} times"
     if sensor == "mono":
         what, consequence = "The scale may have slipped", "what follows may lie on another scale"
     else:
         what, consequence = "The estimated motion is doubtful", "poses there may be wrong"
-    return f"{what} {where}: the images contradicted {times} how the camera moved a moment before; {consequence}."
+    reason = f"the images contradicted {times} how the camera moved a moment before"
+    return f"{what} {_where(stretch)}: {reason}; {consequence}."
+
+
+def _open_scale(frames: Frames, stretch: list[int]) -> str:
+    sigma = float(np.max(frames.scale_sigma[np.isin(frames.numbers, stretch)]))
+    return (
+        f"The scale may have slipped {_where(stretch)} by a factor of {np.exp(sigma):.1f} (one standard deviation): "
+        "the images left open how far the camera went; what follows may lie on another scale."
+    )
 
 
 def _read_evaluation(folder: Path) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-from tessera_cli.constants import FRAME_RATE_WINDOW_S
+from tessera_cli.constants import FRAME_RATE_WINDOW_S, MAX_SCALE_SIGMA
 from tessera_cli.messages import pose_t, stage_status_t
 
 STARTING, RUNNING = stage_status_t.STARTING, stage_status_t.RUNNING
@@ -94,6 +94,8 @@ class Progress:
         self.num_poses += 1
         self.last_frame = max(self.last_frame, pose.frame)
         self.tracking_state = TRACKING_STATES[pose.state]
+        if pose.state == pose_t.TRACKED and pose.scale_sigma > MAX_SCALE_SIGMA:
+            self.tracking_state = "scale in doubt"
         self.last_pose_at = now
         self._recent.append((now, self.num_poses))
         while self._recent[0][0] < now - FRAME_RATE_WINDOW_S:

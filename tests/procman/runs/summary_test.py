@@ -6,8 +6,11 @@ from tessera_cli.runs.run_folder import Frames
 from tessera_cli.runs.summary import scale_warnings
 
 
-def _frames(num: int, doubtful: list[int]) -> Frames:
+def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None = None) -> Frames:
     figures = np.zeros(num)
+    scale_sigma = np.zeros(num)
+    for number, sigma in (open_scale or {}).items():
+        scale_sigma[number] = sigma
     return Frames(
         times_s=0.1 * np.arange(num),
         states=["tracked"] * num,
@@ -19,6 +22,7 @@ def _frames(num: int, doubtful: list[int]) -> Frames:
         landmarks=figures,
         is_keyframe=figures > 0,
         is_step_doubtful=np.isin(np.arange(num), doubtful),
+        scale_sigma=scale_sigma,
         numbers=np.arange(num),
     )
 
@@ -42,3 +46,13 @@ def test_doubts_far_apart_are_told_by_themselves() -> None:
 def test_with_a_baseline_it_is_the_motion_that_is_in_doubt() -> None:
     (sentence,) = scale_warnings(_frames(100, [50, 52]), "stereo")
     assert sentence.startswith("The estimated motion is doubtful between frames 50 and 52: ")
+
+
+def test_frames_that_leave_the_scale_open_are_a_stretch_with_its_factor() -> None:
+    (sentence,) = scale_warnings(_frames(400, [], {100: 0.2, 120: 0.3, 130: 0.7, 140: 0.2}), "mono")
+    assert sentence.startswith("The scale may have slipped between frames 120 and 130 by a factor of 2.0 ")
+
+
+def test_doubts_of_both_kinds_come_in_the_order_of_their_frames() -> None:
+    first, second = scale_warnings(_frames(400, [300], {100: 0.5}), "mono")
+    assert "at frame 100 by a factor" in first and "at frame 300: the images contradicted" in second
