@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/errors.h"
+#include "features/tile_packing.h"
 #include "features/tiling.h"
 #include "messages/topics.h"
 
@@ -30,18 +31,19 @@ std::vector<std::string> ParseRobots(const std::string& text, const std::string&
   return robots;
 }
 
-Result<ExtractorSession::Taken> ExtractorSession::Receive(size_t robot, const TileJob& job, int64_t now_us) {
-  const auto refused = [&job](const std::string& why) {
-    return Failed("job for frame " + std::to_string(job.frame.value) + ", tile " + std::to_string(job.tile) +
-                  " is refused: " + why);
+Result<ExtractorSession::Taken> ExtractorSession::Receive(size_t robot, TileJob job, int64_t now_us) {
+  const auto refused = [frame = job.frame.value, tile = job.tile](const std::string& why) {
+    return Failed("job for frame " + std::to_string(frame) + ", tile " + std::to_string(tile) + " is refused: " + why);
   };
+  if (const Result<> unpacked = UnpackTile(job); !unpacked) return refused(unpacked.error().sentence);
   if (const Result<> fits = CheckTileJob(job); !fits) return refused(fits.error().sentence);
   Robot& owner = robots_[robot];
   const bool is_new_run = job.run != owner.run;
   if (is_new_run) queue_.Drop(robot);
   owner.run = job.run;
   owner.job_came_us = now_us;
-  if (!queue_.Push(robot, WorkOf(job), job)) return refused("too many jobs of this robot wait already");
+  const int64_t work = WorkOf(job);
+  if (!queue_.Push(robot, work, std::move(job))) return refused("too many jobs of this robot wait already");
   return is_new_run ? Taken::kOfNewRun : Taken::kAsBefore;
 }
 

@@ -30,7 +30,7 @@ class ExtractorSession {
 
   enum class Taken { kAsBefore, kOfNewRun };  // kOfNewRun: what was answered before is not needed any longer
   // Fails if the job is refused.
-  Result<Taken> Receive(size_t robot, const TileJob& job, int64_t now_us);
+  Result<Taken> Receive(size_t robot, TileJob job, int64_t now_us);
 
   bool has_jobs() const { return !queue_.empty(); }
   size_t num_waiting(size_t robot) const { return queue_.num_waiting(robot); }

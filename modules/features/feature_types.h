@@ -96,6 +96,7 @@ struct TileJob {
   GrayImage right;   // stereo: right_rect of the right image
   Rect depth_rect;   // RGB-D: level-0 pixels in `depth`
   DepthImage depth;  // RGB-D: depth_rect of the depth image
+  GrayImage packed;  // a row of bytes on the way to another machine (tile_packing.h): the images come in it alone
 
   bool operator==(const TileJob&) const = default;
 };

@@ -100,10 +100,12 @@ struct DispatcherSettings {
   std::string tiles;
   int max_queued_frames = 0;
   int max_frames_in_flight = 0;
+  bool pack_tiles = false;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
     field("tiles", self.tiles);
+    field("pack_tiles", self.pack_tiles);
     field("max_queued_frames", self.max_queued_frames, Range{1, 100'000, "frames"});
     field("max_frames_in_flight", self.max_frames_in_flight, Range{1, 1000, "frames"});
   }

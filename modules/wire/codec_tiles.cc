@@ -15,6 +15,7 @@ namespace tessera {
 namespace {
 
 constexpr int32_t kMaxTiles = 1 << 16;
+constexpr int32_t kMaxPackedBytes = 1 << 28;
 
 // What jobs and their answers have in common.
 template <class Fields, class Message, class Value>
@@ -63,9 +64,16 @@ struct Layout<tile_job_t> {
     fields.Check(is_inside(job.core) && is_inside(job.left_rect) && is_inside_or_empty(job.right_rect) &&
                      is_inside_or_empty(job.depth_rect),
                  "a rectangle leaves the image");
-    fields.Bands(message.band, ImageField{image_band_t::LEFT, job.left, job.left_rect.width, job.left_rect.height},
-                 ImageField{image_band_t::RIGHT, job.right, job.right_rect.width, job.right_rect.height},
-                 ImageField{image_band_t::DEPTH, job.depth, job.depth_rect.width, job.depth_rect.height});
+    fields(message.num_packed, job.packed.width);
+    fields.Check(job.packed.width >= 0 && job.packed.width <= kMaxPackedBytes, "its packed images are too large");
+    const bool is_packed = job.packed.width > 0;
+    const auto image = [is_packed](int8_t name, auto& pixels, const Rect& rect) {
+      return ImageField{name, pixels, is_packed ? 0 : rect.width, is_packed ? 0 : rect.height};
+    };
+    fields.Bands(message.band, ImageField{image_band_t::PACKED, job.packed, job.packed.width, is_packed ? 1 : 0},
+                 image(image_band_t::LEFT, job.left, job.left_rect),
+                 image(image_band_t::RIGHT, job.right, job.right_rect),
+                 image(image_band_t::DEPTH, job.depth, job.depth_rect));
   }
 };
 TESSERA_CODEC(TileJob, tile_job_t);

@@ -25,6 +25,7 @@ def network_assignments(port: int, on_lan: bool) -> list[str]:
     if on_lan:
         tile_url = f"udpm://{MULTICAST_GROUP}:{{port}}?ttl=1"
         assignments += [f"bus.tile_url={tile_url}", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
+        assignments.append("dispatcher.pack_tiles=true")
     return assignments
 
 

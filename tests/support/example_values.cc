@@ -4,6 +4,8 @@
 #include <memory>
 #include <utility>
 
+#include "features/tile_packing.h"
+
 namespace tessera {
 namespace {
 
@@ -129,7 +131,7 @@ TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
     job.depth_rect = job.core;
     job.depth = DrawImage<uint16_t>(generator, job.depth_rect.width, job.depth_rect.height);
   }
-  return job;
+  return Draw(generator, 0, 1) == 1 ? PackTile(job) : job;
 }
 template <>
 bool AreSame(const TileJob& a, const TileJob& b) {

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "features/tile_packing.h"
 #include "messages/tracking_types.h"
 
 namespace tessera {
@@ -24,7 +25,10 @@ DispatcherOptions OptionsFrom(const StageContext& context) {
 }  // namespace
 
 DispatcherStage::DispatcherStage(StageContext& context)
-    : context_(context), session_(OptionsFrom(context)), end_of_stream_(context.Advertise(kEndOfStream)) {
+    : context_(context),
+      packs_tiles_(context.settings().Get<DispatcherSettings>().pack_tiles),
+      session_(OptionsFrom(context)),
+      end_of_stream_(context.Advertise(kEndOfStream)) {
   SubscribeAll();
   context.Every(std::chrono::milliseconds(200), [this] {
     session_.Watch(context_.now_us());
@@ -68,7 +72,7 @@ void DispatcherStage::GiveWork() {
     const WorkQueue::Assignment job = session_.GiveNext(context_.now_us());
     auto [tile, is_new] = tiles_.try_emplace(job.extractor);
     if (is_new) tile->second = context_.Advertise(TileTopic(job.extractor));
-    tile->second.Publish(*job.job);
+    tile->second.Publish(packs_tiles_ ? PackTile(*job.job) : *job.job);
   }
   const std::optional<EndOfStream> end = session_.End(context_.now_us());
   for (const std::string& report : session_.TakeReports()) context_.ReportError(report);

@@ -19,6 +19,7 @@ class DispatcherStage {
   void GiveWork();
 
   StageContext& context_;
+  const bool packs_tiles_;
   DispatcherSession session_;
   std::map<int, Publisher<TileJob>> tiles_;  // by extractor
   Publisher<EndOfStream> end_of_stream_;
