@@ -41,6 +41,7 @@ bool OutgoingStreams::Send(int stream_number, std::vector<Bytes> messages, std::
   bool all_sent = true;
   for (Bytes& message : messages) {
     ++stream.num_sent;
+    if (settings_.authenticator) settings_.authenticator->Sign(stream.full_name, &message);
     const Bytes& kept = is_kept ? stream.history.Append(std::move(message)) : message;
     all_sent = stream.bus->Publish(stream.full_name, kept, source_us) && all_sent;
   }

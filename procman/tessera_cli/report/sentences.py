@@ -156,4 +156,10 @@ def _messages(summary: Summary) -> list[str]:
         was = "was" if undecodable == 1 else "were"
         invalid = f"{count(undecodable, 'message')} could not be decoded and {was} ignored"
         found.append(f"{invalid}: does another program use this bus?")
+    if strangers := summary.get("messages_of_strangers"):
+        was = "was" if strangers == 1 else "were"
+        found.append(
+            f"{count(strangers, 'message')} of strangers {was} passed over: no member of the run sent them, and "
+            "they changed nothing."
+        )
     return found

@@ -82,6 +82,7 @@ class ScriptWatcher:
             wall_s=self._wall_s(folder),
             ended="complete",
             messages_undecodable=sum(report.undecodable for report in self._monitor.reports.values()),
+            messages_of_strangers=sum(report.strangers for report in self._monitor.reports.values()),
         )
 
     def _wall_s(self, folder: Path) -> float:

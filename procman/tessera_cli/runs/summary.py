@@ -57,6 +57,7 @@ class RunFacts:
     wall_s: float  # from the camera's start to the last pose
     ended: str  # "complete", "interrupted", or the sentence of a failure
     messages_undecodable: int
+    messages_of_strangers: int  # that were passed over; each process counts what it hears
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "cpu_s": {name: round(cpu_s, 3) for name, cpu_s in processes.cpu_s.items()},
         "max_rss_mb": {name: round(rss_mb, 1) for name, rss_mb in processes.max_rss_mb.items()},
         "messages_undecodable": facts.messages_undecodable,
+        "messages_of_strangers": facts.messages_of_strangers,
         "extractor_restarts": processes.num_extractor_restarts,
         "warnings": processes.warnings + scale_warnings(result.frames, facts.sensor),
         "versions": collect_versions(),
