@@ -82,6 +82,7 @@ CameraActions CameraSession::Read() {
 
 CameraActions CameraSession::Send(int64_t now_us) {
   last_sent_ = next_->id;
+  if (!first_sent_.valid()) first_sent_ = last_sent_;
   pacer_.MarkSent(last_sent_);
   last_progress_us_ = now_us;
   ++num_sent_;
@@ -104,7 +105,10 @@ CameraActions CameraSession::End() {
   has_ended_ = true;
   last_sent_ = std::max(last_sent_, tracked_);
   CameraActions actions = TruthsUpTo(last_sent_);
-  actions.emplace_back(EndOfStream{.stage = StageKind::kCamera, .num_frames = last_sent_.value + 1});
+  const int64_t num_frames = last_sent_.value + 1;
+  actions.emplace_back(EndOfStream{.stage = StageKind::kCamera,
+                                   .num_frames = num_frames,
+                                   .num_values = first_sent_.valid() ? first_sent_.value : num_frames});
   return actions;
 }
 

@@ -73,7 +73,7 @@ class CameraSession {
   bool is_exhausted_ = false;
   size_t num_truths_sent_ = 0;
   int64_t num_sent_ = 0;
-  FrameId last_sent_;
+  FrameId first_sent_, last_sent_;
   FrameId tracked_;  // this frame, and all before it, have a pose
   int64_t tracked_utime_us_ = 0;
   int64_t last_progress_us_;  // when a frame was last sent or a pose last came

@@ -5,6 +5,8 @@
 namespace tessera {
 namespace {
 
+constexpr int64_t kMaxFramesLost = 100'000;  // on the way, at a time: an hour's
+
 std::string SizeText(int width_px, int height_px) { return std::to_string(width_px) + "x" + std::to_string(height_px); }
 
 }  // namespace
@@ -31,6 +33,11 @@ void DispatcherSession::Receive(const CameraFrame& frame, const FrameArrival& ar
       reports_.push_back("frame " + std::to_string(frame.id.value) + " came after frame " +
                          std::to_string(newest_.value) + " and is ignored: is there a second camera?");
     }
+    return;
+  }
+  if (newest_.valid() && frame.id.value - newest_.value > kMaxFramesLost) {
+    reports_.push_back("frame " + std::to_string(frame.id.value) + " came after frame " +
+                       std::to_string(newest_.value) + " and is ignored: so many can't have been lost on the way");
     return;
   }
   NoteGapBefore(frame.id);

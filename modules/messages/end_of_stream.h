@@ -15,7 +15,9 @@ struct EndOfStream {
   StageKind stage = StageKind::kCamera;
   int64_t num_frames = 0;
   int64_t num_dropped = 0;
-  int64_t num_values = 0;  // tracker: keyframes sent; mapper: deltas sent. Others wait for the last; the rest: 0
+  // Camera: number of the first frame that it sent. Tracker: keyframes sent; mapper: deltas sent: others wait for the
+  // last. The rest: 0.
+  int64_t num_values = 0;
 
   bool operator==(const EndOfStream&) const = default;
 };

@@ -33,7 +33,7 @@ void KeepNumber(const std::string& path, int64_t number) {
 
 Authenticator::Secret ReadRunSecret(const std::string& run_dir) {
   const std::string path = run_dir + "/secret";
-  struct stat status {};
+  struct stat status{};
   if (stat(path.c_str(), &status) != 0) {
     throw InputError("the run's secret " + path + " can't be read (" + std::strerror(errno) +
                      "): `tessera run` and deputies make it; set bus.run_dir to \"\" to do without");

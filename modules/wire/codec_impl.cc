@@ -46,8 +46,7 @@ std::optional<MessageHeader> ReadHeader(ByteView message) {
   if (!in_range) {
     return std::nullopt;
   }
-  return MessageHeader{header.publisher, header.epoch_us, header.sequence, header.utime,
-                       header.part,      header.num_parts};
+  return MessageHeader{header.publisher, header.epoch_us, header.sequence, header.utime, header.part, header.num_parts};
 }
 
 }  // namespace tessera

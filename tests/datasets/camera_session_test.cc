@@ -111,6 +111,7 @@ TEST(CameraSession, TheStreamEndsOnceBehindItsLastFrame) {
   const CameraActions actions = session.Advance(0);
   EXPECT_EQ(EndOf(actions).stage, StageKind::kCamera);
   EXPECT_EQ(EndOf(actions).num_frames, 3);
+  EXPECT_EQ(EndOf(actions).num_values, 0) << "the first frame that it sent";
   EXPECT_EQ(AllOf<Finish>(actions).size(), 1U);
   EXPECT_EQ(session.Look(0), State::kEnded);
   EXPECT_TRUE(session.Advance(0).empty());

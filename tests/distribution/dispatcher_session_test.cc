@@ -105,6 +105,17 @@ TEST(DispatcherSession, NumbersThatAreLeftOutCountAsDropped) {
   EXPECT_EQ(dispatcher.session.num_dropped(), 1);
 }
 
+TEST(DispatcherSession, AFrameFarBeyondAllOthersIsIgnoredAndReported) {
+  Dispatcher dispatcher;
+  dispatcher.Calibrate();
+  dispatcher.Send(1);
+  dispatcher.Send(2'000'000'000);
+  EXPECT_EQ(dispatcher.session.TakeReports().size(), 1U);
+  EXPECT_EQ(dispatcher.session.num_dropped(), 0);
+  dispatcher.Send(2);
+  EXPECT_EQ(dispatcher.WorkOffAll(), (Frames{1, 2}));
+}
+
 TEST(DispatcherSession, AnOldFrameIsIgnoredAndReportedIfTheCameraIsTheSame) {
   Dispatcher dispatcher;
   dispatcher.Calibrate();

@@ -4,6 +4,7 @@ It knows no secret. Most forgeries are genuine messages, changed: with the publi
 repeats all of them until its time is over, and then prints how many it sent, by name, as JSON.
 """
 
+import importlib
 import json
 import os
 import random
@@ -14,10 +15,11 @@ from collections.abc import Callable
 from typing import Any
 
 import lcm
-import tessera
 
 from tessera_cli.constants import FIRST_TILE_PORT_OFFSET, MULTICAST_GROUP, PORT_OFFSETS
 from tessera_cli.messages import decode_as
+
+tessera: Any = importlib.import_module("tessera")  # the generated types; found since messages was imported
 
 Attack = Callable[["Attacker"], None]
 ATTACKS: dict[str, Attack] = {}

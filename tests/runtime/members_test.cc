@@ -31,7 +31,8 @@ class Members : public testing::Test {
       if (status.name == "listener") status_ = status;
     });
     listener_.Subscribe(kPose, [this](const PoseEstimate& pose) { poses_.push_back(pose.frame.value); });
-    listener_.Subscribe(kExtractorReady, [this](const ExtractorReady& ready) { ready_.push_back(ready.num_jobs_done); });
+    listener_.Subscribe(kExtractorReady,
+                        [this](const ExtractorReady& ready) { ready_.push_back(ready.num_jobs_done); });
     listener_.Subscribe(kEndOfStream, [this](const EndOfStream& end) { ends_.push_back(end.stage); });
     // Two heartbeats, so that streams have begun.
     bus_.RunUntilQuiet();
@@ -147,6 +148,27 @@ TEST_F(Members, OfAnotherPrefixAreStrangers) {
   bus_.bus().Publish("POSE", Bytes(captured.front()), std::nullopt);
   bus_.RunUntilQuiet();
   EXPECT_TRUE(poses_.empty());
+}
+
+TEST_F(Members, CanNotFloodTheBusByAskingForRepairs) {
+  StageContext& sender = bus_.AddContext("camera");
+  const auto frames = sender.Advertise(kCamera);
+  for (int i = 0; i < 100; ++i) frames.Publish({.id = {i}, .left = GrayImage(600, 400)});  // 24 MB
+  bus_.RunUntilQuiet();
+  int64_t num_bytes = 0;
+  bus_.bus().Subscribe(this, "CAMERA", [&](const std::string&, ByteView message, int64_t) {
+    num_bytes += static_cast<int64_t>(message.size());
+  });
+  const auto requests = listener_.Advertise(kRepair);
+  const int64_t begin_us = listener_.now_us();
+  for (int i = 0; i < 100; ++i) {
+    requests.Publish(
+        {.channel = "CAMERA", .publisher = "camera", .epoch_us = sender.epoch_us(), .ranges = {{0, 10'000}}});
+    bus_.RunUntilQuiet(0.001);
+  }
+  const double seconds = 1e-6 * static_cast<double>(listener_.now_us() - begin_us);
+  EXPECT_GT(num_bytes, 1'000'000);
+  EXPECT_LT(static_cast<double>(num_bytes), 64e6 * seconds + 2.2e6) << "in " << seconds << " s";
 }
 
 TEST(RunDir, ASecretThatOthersCanReadIsNone) {

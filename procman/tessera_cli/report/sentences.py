@@ -157,9 +157,10 @@ def _messages(summary: Summary) -> list[str]:
         invalid = f"{count(undecodable, 'message')} could not be decoded and {was} ignored"
         found.append(f"{invalid}: does another program use this bus?")
     if strangers := summary.get("messages_of_strangers"):
-        was = "was" if strangers == 1 else "were"
-        found.append(
-            f"{count(strangers, 'message')} of strangers {was} passed over: no member of the run sent them, and "
-            "they changed nothing."
-        )
+        found.append(strangers_sentence(strangers))
     return found
+
+
+def strangers_sentence(num_messages: int) -> str:
+    was = "was" if num_messages == 1 else "were"
+    return f"{count(num_messages, 'message')} of strangers {was} passed over: they changed nothing."

@@ -122,8 +122,9 @@ class Launcher:
             raise
         finally:
             self._deputy.kill()
-        print(self._present(self._summarize(self._wall_s(began), ended), self._folder))
-        return 0 if ended == "complete" or self._source.is_live else 1
+        result = self._summarize(self._wall_s(began), ended)
+        print(self._present(result, self._folder))
+        return 0 if result.summary["ended"] == "complete" or self._source.is_live else 1
 
     def _wall_s(self, began: float) -> float:
         """From the camera's start to the last pose."""

@@ -24,6 +24,7 @@ EVALUATOR_KEYS = (
     "frames_lost",
     "frames_initializing",
     "frames_dropped",
+    "frames_missing",
     "tracking_failures",
     "relocalizations",
     "keyframes",
@@ -79,7 +80,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "sensor": facts.sensor,
         "extractors": facts.extractors,
         "tiles": facts.tiles,
-        "ended": facts.ended,
+        "ended": judge_end(facts.ended, evaluated),
         **{key: evaluated.get(key) for key in EVALUATOR_KEYS},
         "rms_error_m": result.error.rms_m if result.error else None,
         "alignment": _describe_alignment(result),
@@ -95,6 +96,15 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
     }
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     return replace(result, summary=summary)
+
+
+def judge_end(ended: str, evaluated: dict[str, Any]) -> str:
+    """A run is complete if every frame that the camera sent has a pose, or is known to be lost or dropped."""
+    missing = evaluated.get("frames_missing") or 0
+    if ended != "complete" or missing == 0:
+        return ended
+    were = "frame is" if missing == 1 else "frames are"
+    return f"incomplete: {missing} {were} not accounted for, of {evaluated['frames'] + missing} that the camera sent"
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
