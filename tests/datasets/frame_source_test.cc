@@ -60,6 +60,22 @@ TEST_F(VideoTest, YieldsFramesAtTheRateOfTheFile) {
   EXPECT_FALSE(source->Next());
 }
 
+TEST_F(VideoTest, OneThatIsCutOffIsReadAsFarAsItGoesAndSaysWhatItLacks) {
+  folder_.Write("v.yaml", kCalibration);
+  folder_.Truncate("v.avi", 4 * std::filesystem::file_size(folder_.path("v.avi")) / 5);
+  const auto source = OpenSource(Options(source_));
+  EXPECT_TRUE(source->notes().empty());
+  int num_read = 0;
+  while (source->Next()) ++num_read;
+  ASSERT_GT(num_read, 0);
+  ASSERT_LT(num_read, 6);
+  ASSERT_EQ(source->notes().size(), 1U);
+  EXPECT_NE(source->notes()[0].find("after " + std::to_string(num_read) + " of the 6 frames"), std::string::npos)
+      << source->notes()[0];
+  EXPECT_FALSE(source->Next());
+  EXPECT_EQ(source->notes().size(), 1U);
+}
+
 TEST_F(VideoTest, BadInputIsRefused) {
   ExpectInputError([&] { OpenSource(Options(source_)); }, {source_, "--camera FILE.yaml", folder_.path("v.yaml")});
   folder_.Write("v.yaml", kCalibration);
