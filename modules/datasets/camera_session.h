@@ -18,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/result.h"
 #include "core/session_actions.h"
 #include "datasets/frame_source.h"
 #include "datasets/pacer.h"
@@ -43,8 +44,8 @@ class CameraSession {
   CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us);
 
   const FrameSource& source() const { return *source_; }
-  // This frame, taken at `utime_us`, and all before it, have a pose.
-  void MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
+  // This frame, taken at `utime_us`, and all before it, have a pose. Fails if it can't have been sent.
+  Result<> MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
   // Takes the step of the state that Look() just told; none where the camera waits or has ended.
@@ -59,6 +60,8 @@ class CameraSession {
 
   // Without a pose for this long, lockstep asks for help: the slowest pipeline tracks a frame in less.
   static constexpr int64_t kNoPoseUs = 10'000'000;
+  // No pipeline has so many frames in it.
+  static constexpr int64_t kMaxFramesAhead = 10'000;
 
  private:
   void PassOverTracked();

@@ -113,12 +113,17 @@ void DispatcherSession::Receive(const TileAck& ack, int64_t reassembler_epoch_us
   queue_.Acknowledge(ack.frame, ack.tiles);
 }
 
-void DispatcherSession::MarkTracked(FrameId frame) {
+Result<> DispatcherSession::MarkTracked(FrameId frame) {
+  if (newest_.valid() && frame.value > std::max(newest_, tracked_).value + kMaxFramesLost) {
+    return Failed("its frame " + std::to_string(frame.value) + " is far beyond " + std::to_string(newest_.value) +
+                  ", the last one that the camera sent");
+  }
   // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it
   // out.
   if (frame > tracked_ && frame >= gap_begin_ && frame < gap_end_) --num_dropped_;
   tracked_ = std::max(tracked_, frame);
   queue_.MarkTracked(frame);
+  return {};
 }
 
 void DispatcherSession::Receive(const EndOfStream& camera_end, int64_t now_us) {

@@ -17,6 +17,7 @@ from typing import Any
 import lcm
 
 from tessera_cli.constants import FIRST_TILE_PORT_OFFSET, MULTICAST_GROUP, PORT_OFFSETS
+from tessera_cli.membership import sign_message
 from tessera_cli.messages import decode_as
 
 tessera: Any = importlib.import_module("tessera")  # the generated types; found since messages was imported
@@ -73,7 +74,11 @@ def bus_of(channel: str) -> str:
 class Attacker:
     """Hears all buses of the stack at `port`, and sends on them."""
 
-    def __init__(self, port: int, time_to_live: int = 0) -> None:
+    def __init__(self, port: int, time_to_live: int = 0, secret: bytes | None = None) -> None:
+        """`secret`: it is a member, and a bad one."""
+        self._secret = secret
+        self._publisher = ""  # under which name all is sent; empty: under that of whom it imitates
+        self._sequences: Counter[str] = Counter()  # under that name, by channel
         ports = {**PORT_OFFSETS, "tile": FIRST_TILE_PORT_OFFSET}
         self._buses = {
             name: lcm.LCM(f"udpm://{MULTICAST_GROUP}:{port + ports[name]}?ttl={time_to_live}")
@@ -132,17 +137,28 @@ class Attacker:
         return message
 
     def send(self, channel: str, message: Any) -> None:
+        if self._publisher:
+            header = message.header
+            header.publisher, header.sequence = self._publisher, self._sequences[channel]
+            self._sequences[channel] += 1
         if not message.header.tag:
             message.header.tag = self.randomness.randbytes(16)
         self.send_bytes(channel, message.encode())
 
     def send_bytes(self, channel: str, data: bytes) -> None:
+        if self._secret:
+            data = sign_message(channel, data, self._secret)
         self._own.add(hash(data))
         try:
             self._buses[bus_of(channel)].publish(channel, data)
         except (OSError, RuntimeError):
             return
         self.num_sent[self.name] += 1
+
+    def attack(self, name: str, publisher: str) -> None:
+        """One attack, under a name of its own."""
+        self.name, self._publisher = name, publisher
+        ATTACKS[name](self)
 
     def attack_all(self) -> None:
         for self.name, attack in ATTACKS.items():

@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from helpers.attacker import ATTACKS
+from helpers.attacker import ATTACKS, Attacker
 from helpers.namespaces import Lan
 from helpers.nodes import FIRST_NODE_PORT, MakeNode
-from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera, environment
+from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera, environment, pids_of, wait_for
+from tessera_cli.lcm_bus import bus_url
+from tessera_cli.membership import run_dir_of
 
 HASHES = ("trajectory_sha256", "map_sha256")
 # Of each attack while one run lasts: it repeats them all several times a second.
@@ -74,3 +76,29 @@ def test_nor_a_list_on_four_nodes(
         num_sent = end_attacks(attacks)
     assert finished.returncode == 0, finished.stderr
     must_be_unharmed(tmp_path / "out", reference_run, num_sent)
+
+
+def test_a_member_that_asks_without_end_and_tells_nonsense_stalls_nobody(
+    tessera: Tessera, sequence: Path, reference_run: Finished, own_keys: Path
+) -> None:
+    port, folder = tessera.next_port(), tessera.next_folder()
+    words = ("run", f"kitti:{sequence}", "--extractors", 1, "--pace", "0.5", "--port", port, "--out", folder)
+    run = tessera.start(*words)
+    try:
+        wait_for(lambda: pids_of(folder, "camera"), "the camera")
+        secret = run_dir_of(own_keys, bus_url(port), "").secret()
+        assert secret is not None
+        attacker = Attacker(port, secret=secret)
+        while run.poll() is None:
+            attacker.listen(0.05)
+            for name in ("MAP_REQUEST, many", "REPAIR, many", "POSE in sequence: a frame far beyond"):
+                attacker.attack(name, publisher="liar")
+        out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    finally:
+        run.kill()
+    assert run.returncode == 0, out
+    assert min(attacker.num_sent.values()) >= MIN_REPETITIONS
+    summary = json.loads((folder / "summary.json").read_text())
+    for key in ("ended", "frames", "frames_tracked", *HASHES):
+        assert summary[key] == reference_run.summary[key], key
+    assert summary["messages_undecodable"] > 0, "the nonsense was refused and counted"

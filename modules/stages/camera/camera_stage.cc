@@ -48,8 +48,9 @@ CameraStage::CameraStage(StageContext& context)
       end_of_stream_(context.Advertise(kEndOfStream)) {
   for (const std::string& note : session_.source().notes()) context.Info(note);
   num_notes_told_ = session_.source().notes().size();
-  context.Subscribe(
-      kPose, [this](const PoseEstimate& pose) { session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us()); });
+  context.Subscribe(kPose, [this](const PoseEstimate& pose) {
+    return session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us());
+  });
   context.WhenIdle([this] { return Step(); });
   context.Every(kTick, [] {});  // lets the idle task look at the clock
   context.Every(std::chrono::seconds(1), [this] {
