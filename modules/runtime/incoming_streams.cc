@@ -114,12 +114,10 @@ void IncomingStreams::OnRaw(const std::string& full_channel, ByteView message, i
     return;
   }
   const auto header = full_channel.starts_with(settings_.channel_prefix) ? ReadHeader(message) : std::nullopt;
-  if (!header || IsOneOf(type, {"extractor_ready_t", "stage_status_t"})) {
-    raw_handler_(full_channel, message, arrival_us);
-    return;
-  }
+  if (!header) return raw_handler_(full_channel, message, arrival_us);
   const std::string channel = full_channel.substr(settings_.channel_prefix.size());
   if (SenderOf(channel, message) == Sender::kStranger) return PassOver(channel);
+  if (IsOneOf(type, {"extractor_ready_t", "stage_status_t"})) return raw_handler_(full_channel, message, arrival_us);
   ChannelReceiver* receiver = RawReceiver(channel);
   if (receiver == nullptr || !receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
     raw_handler_(full_channel, message, arrival_us);

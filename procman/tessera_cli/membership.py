@@ -68,7 +68,9 @@ class RunDir:
                 with os.fdopen(descriptor, "w") as file:
                     file.write(secret.hex() + "\n")
         except OSError as error:
-            raise UserError(f"the run's folder {self.path} can't be written: {error.strerror}.") from error
+            raise UserError(
+                f"the run's folder {self.path} can't be written: {error.strerror}; TESSERA_KEYS may name another place."
+            ) from error
 
     def lock(self, sentence_if_used: str) -> None:
         """Until this process ends. Raises UserError with this sentence if another one has it."""
@@ -79,7 +81,9 @@ class RunDir:
         except BlockingIOError as error:
             raise UserError(sentence_if_used) from error
         except OSError as error:
-            raise UserError(f"the run's folder {self.path} can't be used: {error.strerror}.") from error
+            raise UserError(
+                f"the run's folder {self.path} can't be used: {error.strerror}; TESSERA_KEYS may name another place."
+            ) from error
 
     def unlock(self) -> None:
         if self._lock is not None:

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -148,6 +148,22 @@ TEST_F(Members, OfAnotherPrefixAreStrangers) {
   bus_.bus().Publish("POSE", Bytes(captured.front()), std::nullopt);
   bus_.RunUntilQuiet();
   EXPECT_TRUE(poses_.empty());
+}
+
+TEST_F(Members, RecordMembersOnly) {
+  std::map<std::string, int> num_recorded;
+  StageContext& recorder = bus_.AddContext("recorder");
+  recorder.SubscribeAll([&](const std::string& channel, ByteView, int64_t) { ++num_recorded[channel]; });
+  bus_.AddContext("tracker").Advertise(kPose).Publish({.frame = {1}});
+  StageContext& stranger = bus_.AddContext("stranger", 0, {"bus.run_dir="});
+  stranger.Advertise(kKeyframe).Publish({});
+  stranger.Advertise(kExtractorReady).Publish({});
+  bus_.bus().Publish("OTHERS", Bytes{1, 2, 3}, std::nullopt);
+  bus_.RunUntilQuiet();
+  EXPECT_EQ(num_recorded["POSE"], 1);
+  EXPECT_EQ(num_recorded["KEYFRAME"], 0);
+  EXPECT_EQ(num_recorded["EXTRACTOR_READY"], 0);
+  EXPECT_EQ(num_recorded["OTHERS"], 1) << "what is not this project's is nobody's to judge";
 }
 
 TEST_F(Members, CanNotFloodTheBusByAskingForRepairs) {
