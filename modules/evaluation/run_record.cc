@@ -127,7 +127,8 @@ std::vector<Rigid3> RunRecord::PosePerFrame() const {
     return {};
   }
   // Frames are numbered without gaps up to the end, so that their count tells the first one's number.
-  const int64_t end = std::max(end_num_frames_.value_or(0), poses_.rbegin()->first.value + 1);
+  const int64_t sent = source_frames_ ? source_frames_->second : 0;  // the last of which may have been dropped
+  const int64_t end = std::max({end_num_frames_.value_or(0), sent, poses_.rbegin()->first.value + 1});
   const int64_t first = std::clamp<int64_t>(end - Counts().frames, 0, poses_.begin()->first.value);
   std::vector<Rigid3> rows;
   Rigid3 last;

@@ -10,7 +10,7 @@ enum class StageKind { kCamera, kDispatcher, kReassembler, kTracker, kMapper };
 
 // The only stage of this kind has sent all it will ever send: the last frame of the stream is num_frames - 1 (the first
 // need not be 0: frames keep their source's numbers), and of all frames that reached it, it and those before it dropped
-// some.
+// some: more than num_frames, if what was dropped came last.
 struct EndOfStream {
   StageKind stage = StageKind::kCamera;
   int64_t num_frames = 0;

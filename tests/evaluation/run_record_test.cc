@@ -237,6 +237,15 @@ TEST(RunRecord, AFirstFrameThatWasDroppedHasARowToo) {
   EXPECT_TRUE(RunRecord().PosePerFrame().empty());
 }
 
+TEST(RunRecord, FramesThatWereDroppedAtTheEndHaveRowsToo) {
+  RunRecord record;
+  for (int64_t frame = 0; frame < 3; ++frame) record.AddPose({.frame = {frame}}, 0);
+  record.SetSource(0, 60);
+  record.SetEnd(3, 57);
+  EXPECT_EQ(record.PosePerFrame().size(), 60U);
+  EXPECT_EQ(record.Counts().missing, 0);
+}
+
 TEST(RunRecord, WhatComesTwiceCountsOnce) {
   RunRecord record = RecordOf({kTracked, kTracked});
   const std::string trajectory_hash = record.TrajectorySha256();

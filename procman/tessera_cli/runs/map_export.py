@@ -71,6 +71,8 @@ def _write_map(values: Settings, folder: Path) -> None:
         deputy.stop()
     finally:
         deputy.kill()
+        if run_dir := values["bus"]["run_dir"]:
+            (Path(run_dir) / f"epoch-{name}").unlink(missing_ok=True)  # no process will have this name again
     say(deputy.last_line(name))
 
 
