@@ -24,13 +24,19 @@ CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const CameraSe
       renumbering_(options.num_on_the_way),
       last_progress_us_(now_us) {}
 
-void CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us) {
+Result<> CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us) {
+  // Frames of an earlier life of this camera may still come back.
+  if (first_sent_.valid() && frame.value > std::max(last_sent_, tracked_).value + kMaxFramesAhead) {
+    return Failed("its frame " + std::to_string(frame.value) + " is far beyond " + std::to_string(last_sent_.value) +
+                  ", the last one sent");
+  }
   if (frame > tracked_) {
     tracked_ = frame;
     tracked_utime_us_ = utime_us;
   }
   pacer_.MarkTracked(frame);
   last_progress_us_ = now_us;
+  return {};
 }
 
 CameraSession::State CameraSession::Look(int64_t now_us) {
@@ -82,6 +88,7 @@ CameraActions CameraSession::Read() {
 
 CameraActions CameraSession::Send(int64_t now_us) {
   last_sent_ = next_->id;
+  if (!first_sent_.valid()) first_sent_ = last_sent_;
   pacer_.MarkSent(last_sent_);
   last_progress_us_ = now_us;
   ++num_sent_;
@@ -104,7 +111,10 @@ CameraActions CameraSession::End() {
   has_ended_ = true;
   last_sent_ = std::max(last_sent_, tracked_);
   CameraActions actions = TruthsUpTo(last_sent_);
-  actions.emplace_back(EndOfStream{.stage = StageKind::kCamera, .num_frames = last_sent_.value + 1});
+  const int64_t num_frames = last_sent_.value + 1;
+  actions.emplace_back(EndOfStream{.stage = StageKind::kCamera,
+                                   .num_frames = num_frames,
+                                   .num_values = first_sent_.valid() ? first_sent_.value : num_frames});
   return actions;
 }
 

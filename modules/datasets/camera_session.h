@@ -18,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/result.h"
 #include "core/session_actions.h"
 #include "datasets/frame_source.h"
 #include "datasets/pacer.h"
@@ -43,8 +44,8 @@ class CameraSession {
   CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us);
 
   const FrameSource& source() const { return *source_; }
-  // This frame, taken at `utime_us`, and all before it, have a pose.
-  void MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
+  // This frame, taken at `utime_us`, and all before it, have a pose. Fails if it can't have been sent.
+  Result<> MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
   // Takes the step of the state that Look() just told; none where the camera waits or has ended.
@@ -59,6 +60,8 @@ class CameraSession {
 
   // Without a pose for this long, lockstep asks for help: the slowest pipeline tracks a frame in less.
   static constexpr int64_t kNoPoseUs = 10'000'000;
+  // No pipeline has so many frames in it.
+  static constexpr int64_t kMaxFramesAhead = 10'000;
 
  private:
   void PassOverTracked();
@@ -73,7 +76,7 @@ class CameraSession {
   bool is_exhausted_ = false;
   size_t num_truths_sent_ = 0;
   int64_t num_sent_ = 0;
-  FrameId last_sent_;
+  FrameId first_sent_, last_sent_;
   FrameId tracked_;  // this frame, and all before it, have a pose
   int64_t tracked_utime_us_ = 0;
   int64_t last_progress_us_;  // when a frame was last sent or a pose last came

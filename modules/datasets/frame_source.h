@@ -40,7 +40,7 @@ class FrameSource {
   virtual void SkipTo(FrameId /*frame*/) {}
   // Whether frames come at their own pace and can't be delayed.
   virtual bool is_live() const = 0;
-  // Notes for the user about how the source was read, one sentence each.
+  // Notes for the user about how the source was read, one sentence each; more may come with each frame.
   virtual const std::vector<std::string>& notes() const = 0;
 };
 

@@ -30,6 +30,7 @@ class StreamSource : public FrameSource {
 
  private:
   void ChooseFrames(const SourceOptions& options);
+  void NoteEarlyEnd();
   int64_t TimeOfLastImage(int64_t index);
 
   std::string name_;
@@ -84,6 +85,13 @@ void StreamSource::ChooseFrames(const SourceOptions& options) {
   }
 }
 
+void StreamSource::NoteEarlyEnd() {
+  if (is_live_ || end_ < 0) return;
+  notes_.push_back(name_ + " is cut off: it ends after " + std::to_string(next_ - first_) + " of the " +
+                   std::to_string(end_ - first_) + " frames that it announces");
+  end_ = next_;
+}
+
 std::optional<int64_t> StreamSource::num_frames() const {
   return end_ < 0 ? std::nullopt : std::optional(end_ - first_);
 }
@@ -112,6 +120,7 @@ std::optional<CameraFrame> StreamSource::Next() {
     image = video_.Read();
   }
   if (!image) {
+    NoteEarlyEnd();
     return std::nullopt;
   }
   RequireSize(image->width, image->height, calibration().width_px, calibration().height_px,

@@ -5,6 +5,8 @@
 namespace tessera {
 namespace {
 
+constexpr int64_t kMaxFramesLost = 100'000;  // on the way, at a time: an hour's
+
 std::string SizeText(int width_px, int height_px) { return std::to_string(width_px) + "x" + std::to_string(height_px); }
 
 }  // namespace
@@ -31,6 +33,11 @@ void DispatcherSession::Receive(const CameraFrame& frame, const FrameArrival& ar
       reports_.push_back("frame " + std::to_string(frame.id.value) + " came after frame " +
                          std::to_string(newest_.value) + " and is ignored: is there a second camera?");
     }
+    return;
+  }
+  if (newest_.valid() && frame.id.value - newest_.value > kMaxFramesLost) {
+    reports_.push_back("frame " + std::to_string(frame.id.value) + " came after frame " +
+                       std::to_string(newest_.value) + " and is ignored: so many can't have been lost on the way");
     return;
   }
   NoteGapBefore(frame.id);
@@ -106,12 +113,17 @@ void DispatcherSession::Receive(const TileAck& ack, int64_t reassembler_epoch_us
   queue_.Acknowledge(ack.frame, ack.tiles);
 }
 
-void DispatcherSession::MarkTracked(FrameId frame) {
+Result<> DispatcherSession::MarkTracked(FrameId frame) {
+  if (newest_.valid() && frame.value > std::max(newest_, tracked_).value + kMaxFramesLost) {
+    return Failed("its frame " + std::to_string(frame.value) + " is far beyond " + std::to_string(newest_.value) +
+                  ", the last one that the camera sent");
+  }
   // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it
   // out.
   if (frame > tracked_ && frame >= gap_begin_ && frame < gap_end_) --num_dropped_;
   tracked_ = std::max(tracked_, frame);
   queue_.MarkTracked(frame);
+  return {};
 }
 
 void DispatcherSession::Receive(const EndOfStream& camera_end, int64_t now_us) {

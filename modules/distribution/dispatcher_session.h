@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/result.h"
 #include "distribution/work_queue.h"
 #include "geometry/camera_frame.h"
 #include "messages/end_of_stream.h"
@@ -46,8 +47,8 @@ class DispatcherSession {
   // `reassembler_epoch_us`: when the reassembler that has the tiles was started. What it had is lost with it: a new one
   // is given everything again.
   void Receive(const TileAck& ack, int64_t reassembler_epoch_us);
-  // This frame, and all before it, have a pose.
-  void MarkTracked(FrameId frame);
+  // This frame, and all before it, have a pose. Fails if the camera can't have sent it.
+  Result<> MarkTracked(FrameId frame);
   // The camera has sent its last frame.
   void Receive(const EndOfStream& camera_end, int64_t now_us);
   // To be called five times a second: looks after extractors, and notices who is missing.

@@ -1,7 +1,14 @@
 #include "evaluation/evaluator_session.h"
 
+#include <algorithm>
+#include <string>
+
 namespace tessera {
 namespace {
+
+// A source that is not looked at for so long, a day and a half at 30 Hz, is another one. What is written has a row for
+// each frame.
+constexpr int64_t kMaxFramesBetweenPoses = int64_t{1} << 22;
 
 StageRecord RecordOf(const StageStatus& status) {
   const StepStatistics& step = status.step;
@@ -14,9 +21,15 @@ StageRecord RecordOf(const StageStatus& status) {
 
 }  // namespace
 
-void EvaluatorSession::Receive(const PoseEstimate& pose, int64_t publish_us, int64_t now_us) {
+Result<> EvaluatorSession::Receive(const PoseEstimate& pose, int64_t publish_us, int64_t now_us) {
+  if (pose.frame.value > last_pose_.value + kMaxFramesBetweenPoses) {
+    return Failed("its frame " + std::to_string(pose.frame.value) + " is far beyond " +
+                  std::to_string(last_pose_.value) + ", the last one with a pose");
+  }
+  last_pose_ = std::max(last_pose_, pose.frame);
   record_.AddPose(pose, publish_us);
   end_.NotePose(pose.frame, now_us);
+  return {};
 }
 
 void EvaluatorSession::Receive(const RemovedInDelta& removed) {
@@ -24,9 +37,16 @@ void EvaluatorSession::Receive(const RemovedInDelta& removed) {
   end_.NoteRemoved(removed.delta);
 }
 
-void EvaluatorSession::Receive(const EndOfStream& end, int64_t now_us) {
+Result<> EvaluatorSession::Receive(const EndOfStream& end, int64_t now_us) {
+  const bool knows_frames = end.stage == StageKind::kCamera || end.stage == StageKind::kTracker;
+  if (knows_frames && end.num_frames <= last_pose_.value) {
+    return Failed("it says that there were " + std::to_string(end.num_frames) + " frames, but frame " +
+                  std::to_string(last_pose_.value) + " has a pose");
+  }
+  if (end.stage == StageKind::kCamera) record_.SetSource(end.num_values, end.num_frames);
   const bool is_new = end_.NoteEnd(end, now_us);
   if (is_new && end.stage == StageKind::kTracker) record_.SetEnd(end.num_frames, end.num_dropped);
+  return {};
 }
 
 void EvaluatorSession::Receive(const StageStatus& status, int64_t now_us) {

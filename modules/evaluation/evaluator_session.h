@@ -20,13 +20,15 @@ class EvaluatorSession {
   explicit EvaluatorSession(std::string own_name) : end_(std::move(own_name)) {}
 
   // `publish_us`: the tracker's wall clock when it published the pose.
-  void Receive(const PoseEstimate& pose, int64_t publish_us, int64_t now_us);
+  // Fails if no source can have so many frames by now.
+  Result<> Receive(const PoseEstimate& pose, int64_t publish_us, int64_t now_us);
   // The next change of the map; fails as Map::Apply does.
   Result<> Receive(const MapDelta& delta) { return record_.ApplyDelta(delta); }
   // One that was started again begins with a snapshot of the map, which does not hold all that poses are relative to.
   void Receive(const RemovedInDelta& removed);
   void Receive(const GroundTruthPose& truth) { record_.AddGroundTruth(truth); }
-  void Receive(const EndOfStream& end, int64_t now_us);
+  // Fails if there were more frames than it says.
+  Result<> Receive(const EndOfStream& end, int64_t now_us);
   void Receive(const StageStatus& status, int64_t now_us);
   // The map has changed, or has to be replaced by a snapshot.
   void NoteMap(bool needs_snapshot, int64_t now_us);
@@ -41,6 +43,7 @@ class EvaluatorSession {
  private:
   RunRecord record_;
   RunEnd end_;
+  FrameId last_pose_;
   bool is_written_ = false;
 };
 

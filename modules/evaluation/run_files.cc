@@ -165,6 +165,7 @@ std::string RunJson(const RunRecord& record) {
                      {"frames_lost", counts.lost},
                      {"frames_initializing", counts.initializing},
                      {"frames_dropped", counts.dropped},
+                     {"frames_missing", counts.missing},
                      {"tracking_failures", counts.tracking_failures},
                      {"relocalizations", counts.relocalizations},
                      {"loops_closed", record.map().closed_loops().size()},

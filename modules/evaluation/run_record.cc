@@ -41,6 +41,8 @@ void RunRecord::SetEnd(int64_t num_frames, int64_t num_dropped) {
   end_num_dropped_ = num_dropped;
 }
 
+void RunRecord::SetSource(int64_t first_frame, int64_t num_frames) { source_frames_.emplace(first_frame, num_frames); }
+
 std::vector<FrameRecord> RunRecord::Frames() const {
   std::vector<FrameRecord> frames;
   for (const auto& [id, pose] : poses_) {
@@ -85,6 +87,11 @@ FrameCounts RunRecord::Counts() const {
     }
   }
   counts.frames = static_cast<int64_t>(poses_.size()) + counts.dropped;
+  if (source_frames_ && end_num_dropped_) {
+    const auto [first_sent, end] = *source_frames_;
+    const int64_t first = poses_.empty() ? first_sent : std::min(first_sent, poses_.begin()->first.value);
+    counts.missing = std::max<int64_t>(0, end - first - counts.frames);
+  }
   return counts;
 }
 
@@ -120,7 +127,8 @@ std::vector<Rigid3> RunRecord::PosePerFrame() const {
     return {};
   }
   // Frames are numbered without gaps up to the end, so that their count tells the first one's number.
-  const int64_t end = std::max(end_num_frames_.value_or(0), poses_.rbegin()->first.value + 1);
+  const int64_t sent = source_frames_ ? source_frames_->second : 0;  // the last of which may have been dropped
+  const int64_t end = std::max({end_num_frames_.value_or(0), sent, poses_.rbegin()->first.value + 1});
   const int64_t first = std::clamp<int64_t>(end - Counts().frames, 0, poses_.begin()->first.value);
   std::vector<Rigid3> rows;
   Rigid3 last;

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/ids.h"
@@ -39,6 +40,7 @@ struct FrameCounts {
   int64_t initializing = 0;       // without a pose, before the first that has one
   int64_t lost = 0;               // without a pose, after it
   int64_t dropped = 0;            // never reached the tracker
+  int64_t missing = 0;            // that the camera sent, and nobody accounts for: no pose, and not told to be dropped
   int64_t tracking_failures = 0;  // changes from tracked to lost, also if the same frame was found again
   int64_t relocalizations = 0;    // changes back, into a part of the map that was there before
 };
@@ -73,6 +75,9 @@ class RunRecord {
   void SetStage(const std::string& name, const StageRecord& figures);
   // The tracker has seen the end: one past the last frame's number, and how many frames never reached it.
   void SetEnd(int64_t num_frames, int64_t num_dropped);
+
+  // The camera has sent frames first_frame .. num_frames - 1, or was started again and sent those before, too.
+  void SetSource(int64_t first_frame, int64_t num_frames);
 
   bool empty() const { return poses_.empty(); }
   bool HasPose(FrameId frame) const { return poses_.contains(frame); }
@@ -112,6 +117,7 @@ class RunRecord {
   std::map<std::string, StageRecord> stages_;
   std::optional<int64_t> end_num_frames_;
   std::optional<int64_t> end_num_dropped_;
+  std::optional<std::pair<int64_t, int64_t>> source_frames_;  // the first, and one past the last
 };
 
 }  // namespace tessera

@@ -47,6 +47,7 @@ struct StageStatus {
   int64_t num_repaired = 0;     // messages that were lost on the way and came after being asked for again
   int64_t num_lost = 0;         // messages that never came
   int64_t num_undecodable = 0;  // messages whose bytes or values made no sense
+  int64_t num_strangers = 0;    // messages that no member of the run sent, or that were replayed
   int64_t queue = 0;            // values waiting for it now
   StepStatistics step;
   double cpu_percent = 0;  // since the last status; 100 is one core

@@ -13,6 +13,12 @@ bool IsOneOf(const WireType* type, std::initializer_list<const char*> names) {
          std::any_of(names.begin(), names.end(), [&](const char* name) { return type->name() == name; });
 }
 
+// What a camera, or a log player in its place, sends.
+bool IsSentByCameras(const std::string& channel) {
+  return channel == kCamera.name || channel == kCalibration.name || channel == kGroundTruth.name ||
+         channel == kEndOfStream.name;
+}
+
 }  // namespace
 
 IncomingStreams::IncomingStreams(const StreamSettings& settings, const Clock& clock,
@@ -46,12 +52,42 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   buses_.push_back(std::move(bus));
 }
 
-void IncomingStreams::OnMessage(const Subscription& subscription, ByteView message, int64_t arrival_us) {
-  const auto header = WireType::Of(message) == subscription.type ? ReadHeader(message) : std::nullopt;
+IncomingStreams::Sender IncomingStreams::SenderOf(const std::string& channel, ByteView message) const {
+  if (!settings_.authenticator) return Sender::kMember;
+  const bool is_open = !settings_.camera_is_member && IsSentByCameras(channel);
+  if (is_open && channel != kEndOfStream.name) return Sender::kOutside;
+  if (settings_.authenticator->Verify(settings_.channel_prefix + channel, message)) return Sender::kMember;
+  return is_open ? Sender::kOutside : Sender::kStranger;
+}
+
+// A member's message that is heard again was captured and sent by somebody else. What has an order is judged there.
+bool IncomingStreams::IsRepeated(Subscription& subscription, const MessageHeader& header) const {
+  if (!settings_.authenticator || subscription.receiver) return false;
+  const std::pair number(header.epoch_us, header.sequence);
+  const auto [it, is_new] = subscription.newest.try_emplace(header.publisher, number);
+  if (is_new) return false;
+  if (number <= it->second) return true;
+  it->second = number;
+  return false;
+}
+
+void IncomingStreams::PassOver(const std::string& channel) {
+  if (num_strangers_++ == 0) {
+    report_("a message on " + channel + " is passed over: no member of this run sent it; STATUS counts all of them");
+  }
+}
+
+void IncomingStreams::OnMessage(Subscription& subscription, ByteView message, int64_t arrival_us) {
+  const Sender sender = SenderOf(subscription.channel, message);
+  if (sender == Sender::kStranger) return PassOver(subscription.channel);
+  auto header = WireType::Of(message) == subscription.type ? ReadHeader(message) : std::nullopt;
   if (!header) {
-    Refuse(subscription.channel,
-           "its " + std::to_string(message.size()) + " bytes are no " + subscription.type->name());
-  } else if (!subscription.receiver) {
+    return Refuse(subscription.channel,
+                  "its " + std::to_string(message.size()) + " bytes are no " + subscription.type->name());
+  }
+  header->is_from_outside = sender == Sender::kOutside;
+  if (IsRepeated(subscription, *header)) return PassOver(subscription.channel);
+  if (!subscription.receiver) {
     subscription.sink.deliver(message, *header, arrival_us);
   } else if (!subscription.receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
     Refuse(subscription.channel, "its number " + std::to_string(header->sequence) + " is implausible");
@@ -78,11 +114,11 @@ void IncomingStreams::OnRaw(const std::string& full_channel, ByteView message, i
     return;
   }
   const auto header = full_channel.starts_with(settings_.channel_prefix) ? ReadHeader(message) : std::nullopt;
-  if (!header || IsOneOf(type, {"extractor_ready_t", "stage_status_t"})) {
-    raw_handler_(full_channel, message, arrival_us);
-    return;
-  }
-  ChannelReceiver* receiver = RawReceiver(full_channel.substr(settings_.channel_prefix.size()));
+  if (!header) return raw_handler_(full_channel, message, arrival_us);
+  const std::string channel = full_channel.substr(settings_.channel_prefix.size());
+  if (SenderOf(channel, message) == Sender::kStranger) return PassOver(channel);
+  if (IsOneOf(type, {"extractor_ready_t", "stage_status_t"})) return raw_handler_(full_channel, message, arrival_us);
+  ChannelReceiver* receiver = RawReceiver(channel);
   if (receiver == nullptr || !receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
     raw_handler_(full_channel, message, arrival_us);
   }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/bus.h"
@@ -51,6 +52,8 @@ class IncomingStreams {
 
   StreamCounts counts() const;
   int64_t num_undecodable() const { return num_undecodable_; }
+  // Messages that were passed over: no member of the run sent them, or they were heard before.
+  int64_t num_strangers() const { return num_strangers_; }
   // Counts and reports a message that was refused, after its header had been found good.
   void Refuse(const std::string& channel, const std::string& problem);
 
@@ -61,8 +64,15 @@ class IncomingStreams {
     const WireType* type = nullptr;
     std::unique_ptr<ChannelReceiver> receiver;  // null: unordered
     ChannelReceiver::Sink sink;
+    // Unordered: the newest message of each publisher, by epoch and sequence number.
+    std::map<std::string, std::pair<int64_t, int64_t>> newest;
   };
-  void OnMessage(const Subscription& subscription, ByteView message, int64_t arrival_us);
+  enum class Sender { kMember, kOutside, kStranger };
+  void OnMessage(Subscription& subscription, ByteView message, int64_t arrival_us);
+  // Who sent a message on the channel (without prefix). All are members where messages are not checked.
+  Sender SenderOf(const std::string& channel, ByteView message) const;
+  bool IsRepeated(Subscription& subscription, const MessageHeader& header) const;
+  void PassOver(const std::string& channel);
   void OnRaw(const std::string& full_channel, ByteView message, int64_t arrival_us);
   ChannelReceiver* RawReceiver(const std::string& channel);
 
@@ -75,6 +85,7 @@ class IncomingStreams {
   std::vector<std::shared_ptr<Bus>> raw_buses_;
   std::map<std::string, std::unique_ptr<ChannelReceiver>> raw_;  // by channel, without prefix
   int64_t num_undecodable_ = 0;
+  int64_t num_strangers_ = 0;
 };
 
 }  // namespace tessera

@@ -12,6 +12,7 @@ namespace {
 
 // A receiver is expected to empty its buffer in this time: LCM's own thread does nothing else.
 constexpr double kDrainSeconds = 0.002;
+constexpr int kMaxQueuedMessages = 1 << 16;  // of one subscription
 
 }  // namespace
 
@@ -58,8 +59,9 @@ void LcmBus::Subscribe(const void* owner, const std::string& channel, Handler ha
           "that drops UDP multicast, or give loopback the route: `sudo ip link set lo multicast on` "
           "and `sudo ip route add 224.0.0.0/4 dev lo`");
     }
-    // LCM would drop messages beyond 30; flow control bounds this queue, not LCM.
-    lcm_subscription_set_queue_capacity(subscription, 0);
+    // LCM would drop messages beyond 30. Flow control bounds this queue; the limit is for what strangers send during a
+    // long step.
+    lcm_subscription_set_queue_capacity(subscription, kMaxQueuedMessages);
     file_descriptor_ = lcm_get_fileno(lcm_);
   }
   topic->subscribers.push_back(std::make_shared<Subscriber>(Subscriber{owner, std::move(handler)}));

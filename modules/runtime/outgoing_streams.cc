@@ -9,11 +9,14 @@ namespace {
 constexpr size_t kStreamsPerHeartbeat = 16;  // fits 1400 bytes
 constexpr int kMaxResent = 1024;             // messages sent again on one request
 constexpr size_t kLcmHeaderBytes = 8;
+constexpr double kResentBytesPerSecond = 64e6;  // in all: all that is kept of a stream within a second or so
 
 }  // namespace
 
 OutgoingStreams::OutgoingStreams(const StageIdentity& identity, const StreamSettings& settings)
-    : identity_(identity), settings_(settings) {}
+    : identity_(identity),
+      settings_(settings),
+      resending_(kResentBytesPerSecond, 0.5 * static_cast<double>(settings.receive_buffer_bytes)) {}
 
 int OutgoingStreams::Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired) {
   streams_.push_back({.channel = channel,
@@ -41,6 +44,7 @@ bool OutgoingStreams::Send(int stream_number, std::vector<Bytes> messages, std::
   bool all_sent = true;
   for (Bytes& message : messages) {
     ++stream.num_sent;
+    if (settings_.authenticator) settings_.authenticator->Sign(stream.full_name, &message);
     const Bytes& kept = is_kept ? stream.history.Append(std::move(message)) : message;
     all_sent = stream.bus->Publish(stream.full_name, kept, source_us) && all_sent;
   }
@@ -61,6 +65,7 @@ void OutgoingStreams::Resend(const RepairRequest& request, int64_t now_us) {
     const int64_t end = std::min(range.last + 1, stream->history.next());
     for (int64_t i = std::max(range.first, stream->history.first()); i < end && num_resent < kMaxResent; ++i) {
       if (const Bytes* message = stream->history.Resend(i, now_us, settings_.receiver.repair_us / 2)) {
+        if (!resending_.Take(static_cast<double>(message->size()), now_us)) return;
         stream->bus->Publish(stream->full_name, *message, std::nullopt);
         ++num_resent;
       }

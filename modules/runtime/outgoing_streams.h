@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/rate_limit.h"
 #include "runtime/bus.h"
 #include "runtime/stream_settings.h"
 #include "streams/stream_history.h"
@@ -39,7 +40,7 @@ class OutgoingStreams {
   // What was sent so far is not kept any longer.
   void Forget(int stream) { streams_[static_cast<size_t>(stream)].history.Clear(); }
 
-  // Sends again what is asked for and still there.
+  // Sends again what is asked for and still there, as fast as receivers can take it; who lacks more asks again.
   void Resend(const RepairRequest& request, int64_t now_us);
 
   // How far the repaired streams have come, in lots that each fit one message.
@@ -60,6 +61,7 @@ class OutgoingStreams {
   const StageIdentity identity_;
   const StreamSettings settings_;
   std::vector<Stream> streams_;
+  RateLimit resending_;  // bytes
 };
 
 }  // namespace tessera

@@ -16,6 +16,7 @@
 #include "core/errors.h"
 #include "core/project_file.h"
 #include "core/version.h"
+#include "runtime/run_dir.h"
 #include "runtime/stage.h"
 #include "runtime/stage_engine.h"
 #include "runtime/udp_check.h"
@@ -98,9 +99,10 @@ StageEngine::Setup MakeSetup(const Arguments& arguments) {
   StageEngine::Setup setup;
   setup.settings = ReadSettings(arguments);
   setup.clock = std::make_shared<ComputerClock>();
+  const std::string run_dir = setup.settings.Get<BusSettings>().run_dir;
   setup.identity = {.name = arguments.name,
                     .id = arguments.id,
-                    .epoch_us = setup.clock->WallUs(),
+                    .epoch_us = BeginEpoch(run_dir, arguments.name, setup.clock->WallUs()),
                     .host = HostName(),
                     .pid = static_cast<int32_t>(getpid())};
   const int buffer_bytes = setup.settings.Get<BusSettings>().receive_buffer_bytes;

@@ -208,8 +208,8 @@ void StageEngine::SendStatus(bool is_final) {
   if (is_final) {
     for (const auto& other : others_) other->SendStatus(true);
   }
-  SendValue(status_stream_,
-            figures_.MakeStatus(state, incoming_.counts(), incoming_.num_undecodable(), now_us, is_final));
+  SendValue(status_stream_, figures_.MakeStatus(state, incoming_.counts(), incoming_.num_undecodable(),
+                                                incoming_.num_strangers(), now_us, is_final));
 }
 
 void StageEngine::ReportError(const std::string& sentence) {

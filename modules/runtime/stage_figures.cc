@@ -67,7 +67,7 @@ void StageFigures::SetValue(const std::string& name, double value) {
 }
 
 StageStatus StageFigures::MakeStatus(StageState state, const StreamCounts& counts, int64_t num_undecodable,
-                                     int64_t now_us, bool is_final) {
+                                     int64_t num_strangers, int64_t now_us, bool is_final) {
   constexpr int64_t kStatisticsPeriodUs = 1'000'000;
   constexpr size_t kMaxSentenceLength = 300;  // so that a status is one message also on a LAN
   const double cpu_s = CpuSeconds();
@@ -88,6 +88,7 @@ StageStatus StageFigures::MakeStatus(StageState state, const StreamCounts& count
   status_.num_repaired = counts.num_repaired;
   status_.num_lost = counts.num_lost;
   status_.num_undecodable = num_undecodable;
+  status_.num_strangers = num_strangers;
   status_.queue = queue;
   status_.rss_mb = ResidentMb();
   status_.last_error = last_error.substr(0, kMaxSentenceLength);

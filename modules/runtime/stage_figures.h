@@ -21,8 +21,8 @@ class StageFigures {
   void RecordStep(double milliseconds) { steps_ms_.push_back(static_cast<float>(milliseconds)); }
   void SetValue(const std::string& name, double value);
   // The status at this moment. Step statistics are computed at most once a second, unless `is_final`.
-  StageStatus MakeStatus(StageState state, const StreamCounts& counts, int64_t num_undecodable, int64_t now_us,
-                         bool is_final);
+  StageStatus MakeStatus(StageState state, const StreamCounts& counts, int64_t num_undecodable, int64_t num_strangers,
+                         int64_t now_us, bool is_final);
 
   // Counted by whoever does it.
   int64_t num_received = 0;

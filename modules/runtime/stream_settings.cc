@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "runtime/run_dir.h"
+
 namespace tessera {
 StreamSettings StreamSettings::From(const Settings& settings) {
   const auto bus = settings.Get<BusSettings>();
@@ -20,6 +22,8 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   receiver.unwatched_us = std::max<int64_t>(300'000, 3 * result.heartbeat_us);
   receiver.max_asked = std::clamp(result.receive_buffer_bytes / 4 / static_cast<int>(result.max_message_bytes), 8, 512);
   receiver.max_waiting_bytes = result.history_bytes;
+  if (!bus.run_dir.empty()) result.authenticator = std::make_shared<const Authenticator>(ReadRunSecret(bus.run_dir));
+  result.camera_is_member = bus.camera_is_member;
   return result;
 }
 

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "settings/settings.h"
+#include "streams/authenticator.h"
 #include "streams/stream_receiver.h"
 
 namespace tessera {
@@ -17,7 +19,10 @@ struct StreamSettings {
   size_t history_bytes = 0;
   int64_t heartbeat_us = 0;
   StreamReceiverOptions receiver;
+  std::shared_ptr<const Authenticator> authenticator;  // null: messages are neither signed nor checked
+  bool camera_is_member = true;
 
+  // Throws InputError if the run's secret can't be read.
   static StreamSettings From(const Settings& settings);
 };
 

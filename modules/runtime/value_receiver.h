@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/result.h"
+#include "messages/end_of_stream.h"
 #include "wire/codec.h"
 
 namespace tessera {
@@ -67,6 +68,11 @@ class TypedReceiver : public ValueReceiver {
     const Result<const Value*> value = joiner_.Add(message, header);
     TESSERA_RETURN_IF_FAILED(value);
     if (*value == nullptr) return false;
+    if constexpr (std::is_same_v<Value, EndOfStream>) {
+      if (header.is_from_outside && (*value)->stage != StageKind::kCamera) {
+        return Failed("only the end of the camera's stream may come from outside of the run");
+      }
+    }
     TESSERA_RETURN_IF_FAILED((*handler_)(**value, {.publisher = header.publisher,
                                                    .epoch_us = header.epoch_us,
                                                    .sequence = header.sequence,

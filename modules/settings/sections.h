@@ -42,6 +42,8 @@ struct BusSettings {
   std::string channel_prefix;
   int receive_buffer_bytes = 0;
   int max_message_bytes = 0;
+  std::string run_dir;
+  bool camera_is_member = true;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
@@ -55,6 +57,8 @@ struct BusSettings {
     field("receive_buffer_bytes", self.receive_buffer_bytes, Range{1 << 16, 1 << 30, "bytes"});
     // Above 65,499 bytes LCM would cut messages into fragments, whose loss nobody could repair one by one.
     field("max_message_bytes", self.max_message_bytes, Range{1000, 65000, "bytes"});
+    field("run_dir", self.run_dir);
+    field("camera_is_member", self.camera_is_member);
   }
 };
 

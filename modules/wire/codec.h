@@ -16,7 +16,11 @@
 
 namespace tessera {
 
-// header_t, checked.
+// Where header_t::tag stands in every message: behind the type's fingerprint.
+inline constexpr size_t kTagOffset = 8;
+inline constexpr size_t kTagBytes = 16;
+
+// header_t, checked, without its tag.
 struct MessageHeader {
   std::string publisher;
   int64_t epoch_us = 0;
@@ -24,6 +28,7 @@ struct MessageHeader {
   int64_t publish_us = 0;
   int32_t part = 0;
   int32_t num_parts = 1;
+  bool is_from_outside = false;  // no field: it was accepted although its sender is no member of the run
 };
 
 // The header of a message of any type; nullopt if the message has no type of lcmtypes/, is malformed or its header is

@@ -20,8 +20,8 @@ void SetHeader(const MessageHeader& header, header_t* message_header) {
 }
 
 void PatchNumParts(const std::string& publisher, int32_t num_parts, Bytes* message) {
-  // Fingerprint (8 bytes), publisher (length, text, zero), epoch, sequence, utime (8 each), part (4), num_parts.
-  uint8_t* at = message->data() + 8 + 4 + publisher.size() + 1 + 3 * 8 + 4;
+  // Fingerprint, tag, publisher (length, text, zero), epoch, sequence, utime (8 each), part (4), num_parts.
+  uint8_t* at = message->data() + kTagOffset + kTagBytes + 4 + publisher.size() + 1 + 3 * 8 + 4;
   for (int shift = 24; shift >= 0; shift -= 8) {
     *at++ = static_cast<uint8_t>(static_cast<uint32_t>(num_parts) >> shift);
   }

@@ -38,6 +38,7 @@ struct Layout<stage_status_t> {
     fields.Count(message.num_repaired, status.num_repaired);
     fields.Count(message.num_lost, status.num_lost);
     fields.Count(message.num_undecodable, status.num_undecodable);
+    fields.Count(message.num_strangers, status.num_strangers);
     fields.Count(message.queue, status.queue);
     fields.Count(message.step_count, status.step.count);
     fields(message.step_mean_ms, status.step.mean_ms);

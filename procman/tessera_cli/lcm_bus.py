@@ -12,6 +12,7 @@ import lcm
 
 from tessera_cli.constants import MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
 from tessera_cli.errors import RunError
+from tessera_cli.membership import is_of_member
 from tessera_cli.messages import decode, header_t
 
 
@@ -33,27 +34,45 @@ def procman_url(arguments: Namespace) -> str:
 class Bus:
     """One LCM instance. `publisher` names this process in the headers of what it sends."""
 
-    def __init__(self, url: str, publisher: str) -> None:
-        """Raises RunError if the bus can't be opened."""
+    def __init__(self, url: str, publisher: str, epoch_us: int | None = None) -> None:
+        """`epoch_us`: of this publisher's life, more than all earlier ones had; None: the time.
+
+        Raises RunError if the bus can't be opened.
+        """
         self.url = url
         self._publisher = publisher
-        self._epoch_us = int(time.time() * 1e6)
+        self._epoch_us = epoch_us or int(time.time() * 1e6)
         self._sequences: dict[str, int] = {}
+        self.num_strangers = 0  # messages passed over
         try:
             self._lcm = lcm.LCM(url)
         except RuntimeError as error:
             raise RunError(_explain(url, str(error))) from error
 
-    def subscribe(self, channel: str, message_type: Any, handler: Callable[[Any], None]) -> Any:
+    def subscribe(
+        self, channel: str, message_type: Any, handler: Callable[[Any], None], secret: bytes | None = None
+    ) -> Any:
         """`handler` gets decoded messages, or bytes where `message_type` is None. Invalid messages are ignored.
 
-        Returns the subscription, for `unsubscribe`.
+        `secret`: of a run; then messages that no member of it sent are passed over, as are those that are not newer
+        than what their publisher sent before. Returns the subscription, for `unsubscribe`.
         """
+        newest: dict[str, tuple[int, int]] = {}  # by publisher: epoch and sequence number
 
         def on_message(_channel: str, data: bytes) -> None:
-            message = data if message_type is None else decode(message_type, data)
-            if message is not None:
-                handler(message)
+            if secret is not None and not is_of_member(channel, data, secret):
+                self.num_strangers += 1
+                return
+            message: Any = data if message_type is None else decode(message_type, data)
+            if message is None:
+                return
+            if secret is not None and message_type is not None:
+                header = message.header
+                number = (header.epoch_us, header.sequence)
+                if number <= newest.get(header.publisher, (0, -1)):
+                    return
+                newest[header.publisher] = number
+            handler(message)
 
         # None: another program holds the port exclusively, or LCM's self-test received nothing.
         subscription = self._lcm.subscribe(channel, on_message)

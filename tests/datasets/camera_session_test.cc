@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "support/matchers.h"
 
 namespace tessera {
 namespace {
@@ -86,9 +87,9 @@ TEST(CameraSession, LockstepSendsAsFastAsPosesComeBack) {
   CameraSession session = Recorded(5);
   EXPECT_EQ(SendAll(session), (Frames{0, 1, 2}));
   EXPECT_EQ(session.Look(0), State::kWaits) << "frame 3 has been read";
-  session.MarkTracked({0}, 0, 0);
+  EXPECT_THAT(session.MarkTracked({0}, 0, 0), IsSuccess());
   EXPECT_EQ(SendAll(session), Frames{3});
-  session.MarkTracked({3}, 3 * kFrameUs, 0);
+  EXPECT_THAT(session.MarkTracked({3}, 3 * kFrameUs, 0), IsSuccess());
   EXPECT_EQ(SendAll(session), Frames{4});
   EXPECT_EQ(session.Look(0), State::kAtEnd);
   EXPECT_EQ(session.num_sent(), 5);
@@ -111,10 +112,19 @@ TEST(CameraSession, TheStreamEndsOnceBehindItsLastFrame) {
   const CameraActions actions = session.Advance(0);
   EXPECT_EQ(EndOf(actions).stage, StageKind::kCamera);
   EXPECT_EQ(EndOf(actions).num_frames, 3);
+  EXPECT_EQ(EndOf(actions).num_values, 0) << "the first frame that it sent";
   EXPECT_EQ(AllOf<Finish>(actions).size(), 1U);
   EXPECT_EQ(session.Look(0), State::kEnded);
   EXPECT_TRUE(session.Advance(0).empty());
   EXPECT_TRUE(session.End().empty());
+}
+
+TEST(CameraSession, APoseOfAFrameThatWasNeverSentIsRefused) {
+  CameraSession session = Recorded(9, 2);
+  SendAll(session);
+  EXPECT_FALSE(session.MarkTracked({2'000'000'000}, 0, 0).has_value());
+  EXPECT_THAT(session.MarkTracked({1}, kFrameUs, 0), IsSuccess());
+  EXPECT_EQ(session.Look(0), State::kMustRead) << "it continues where it was";
 }
 
 TEST(CameraSession, ToldToStopItEndsWhereItIs) {
@@ -139,20 +149,20 @@ TEST(CameraSession, WithoutFollowersNoPoseIsWaitedFor) {
 
 TEST(CameraSession, ARecordedSourceContinuesBehindWhatIsTracked) {
   CameraSession session = Recorded(9, 2);
-  session.MarkTracked({4}, 4 * kFrameUs, 0);
+  EXPECT_THAT(session.MarkTracked({4}, 4 * kFrameUs, 0), IsSuccess());
   EXPECT_EQ(SendAll(session), (Frames{5, 6}));
 }
 
 TEST(CameraSession, WhatIsTrackedToItsEndEndsThere) {
   CameraSession session = Recorded(5, 2);
-  session.MarkTracked({4}, 4 * kFrameUs, 0);
+  EXPECT_THAT(session.MarkTracked({4}, 4 * kFrameUs, 0), IsSuccess());
   EXPECT_TRUE(SendAll(session).empty());
   EXPECT_EQ(EndOf(session.End()).num_frames, 5);
 }
 
 TEST(CameraSession, ALiveSourceContinuesWithHigherNumbers) {
   CameraSession session(std::make_unique<FakeSource>(3, true, -1), {{.lockstep_window = 2}, true, 10}, 0);
-  session.MarkTracked({100}, 100 * kFrameUs, 0);
+  EXPECT_THAT(session.MarkTracked({100}, 100 * kFrameUs, 0), IsSuccess());
   EXPECT_EQ(SendAll(session), (Frames{111, 112, 113})) << "at its own pace, behind all that may be on its way";
 }
 
@@ -163,7 +173,7 @@ TEST(CameraSession, LockstepAsksForHelpWhenNoPoseComes) {
   EXPECT_FALSE(session.Watch(CameraSession::kNoPoseUs));
   EXPECT_TRUE(session.Watch(CameraSession::kNoPoseUs + 1));
   EXPECT_FALSE(session.Watch(CameraSession::kNoPoseUs + 2)) << "once";
-  session.MarkTracked({0}, 0, CameraSession::kNoPoseUs + 3);
+  EXPECT_THAT(session.MarkTracked({0}, 0, CameraSession::kNoPoseUs + 3), IsSuccess());
   EXPECT_FALSE(session.Watch(CameraSession::kNoPoseUs + 4));
   EXPECT_TRUE(session.Watch(2 * CameraSession::kNoPoseUs + 4)) << "and again";
 }

@@ -24,10 +24,12 @@ TEST(OpenSource, UnknownSourcesAreRefused) {
 
 class VideoTest : public testing::Test {
  protected:
-  VideoTest() {
+  VideoTest() { WriteVideo(6); }
+
+  void WriteVideo(int num_frames) {
     cv::VideoWriter writer(folder_.path("v.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25.0, cv::Size(64, 48),
                            true);
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < num_frames; ++i) {
       writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20.0 + 30.0 * i)));
     }
     writer.release();
@@ -58,6 +60,23 @@ TEST_F(VideoTest, YieldsFramesAtTheRateOfTheFile) {
     EXPECT_NEAR(frame->left.row(24)[32], 20 + 30 * i, 3);
   }
   EXPECT_FALSE(source->Next());
+}
+
+TEST_F(VideoTest, OneThatIsCutOffIsReadAsFarAsItGoesAndSaysWhatItLacks) {
+  folder_.Write("v.yaml", kCalibration);
+  WriteVideo(60);
+  folder_.Truncate("v.avi", 4 * std::filesystem::file_size(folder_.path("v.avi")) / 5);
+  const auto source = OpenSource(Options(source_));
+  EXPECT_TRUE(source->notes().empty());
+  int num_read = 0;
+  while (source->Next()) ++num_read;
+  ASSERT_GT(num_read, 0);
+  ASSERT_LT(num_read, 60);
+  ASSERT_EQ(source->notes().size(), 1U);
+  EXPECT_NE(source->notes()[0].find("after " + std::to_string(num_read) + " of the 60 frames"), std::string::npos)
+      << source->notes()[0];
+  EXPECT_FALSE(source->Next());
+  EXPECT_EQ(source->notes().size(), 1U);
 }
 
 TEST_F(VideoTest, BadInputIsRefused) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "support/matchers.h"
 #include "support/synthetic_images.h"
 
 namespace tessera {
@@ -47,7 +48,7 @@ class Dispatcher {
     while (session.CanGive()) {
       const TileJob job = *session.GiveNext(0).job;
       session.Receive(TileAck{.frame = job.frame, .tiles = {job.tile}}, kReassemblerEpochUs);
-      session.MarkTracked(job.frame);
+      EXPECT_THAT(session.MarkTracked(job.frame), IsSuccess());
       frames.push_back(job.frame.value);
     }
     return frames;
@@ -99,10 +100,29 @@ TEST(DispatcherSession, NumbersThatAreLeftOutCountAsDropped) {
   EXPECT_EQ(dispatcher.session.num_dropped(), 0) << "the first frame need not be frame 0";
   dispatcher.Send(8);
   EXPECT_EQ(dispatcher.session.num_dropped(), 2);
-  dispatcher.session.MarkTracked({6});
+  EXPECT_THAT(dispatcher.session.MarkTracked({6}), IsSuccess());
   EXPECT_EQ(dispatcher.session.num_dropped(), 1) << "it was tracked: the camera knew, and left it out";
-  dispatcher.session.MarkTracked({6});
+  EXPECT_THAT(dispatcher.session.MarkTracked({6}), IsSuccess());
   EXPECT_EQ(dispatcher.session.num_dropped(), 1);
+}
+
+TEST(DispatcherSession, AFrameFarBeyondAllOthersIsIgnoredAndReported) {
+  Dispatcher dispatcher;
+  dispatcher.Calibrate();
+  dispatcher.Send(1);
+  dispatcher.Send(2'000'000'000);
+  EXPECT_EQ(dispatcher.session.TakeReports().size(), 1U);
+  EXPECT_EQ(dispatcher.session.num_dropped(), 0);
+  dispatcher.Send(2);
+  EXPECT_EQ(dispatcher.WorkOffAll(), (Frames{1, 2}));
+}
+
+TEST(DispatcherSession, APoseOfAFrameThatNoCameraSentIsRefused) {
+  Dispatcher dispatcher;
+  dispatcher.Calibrate();
+  dispatcher.Send(1);
+  EXPECT_FALSE(dispatcher.session.MarkTracked({2'000'000'000}).has_value());
+  EXPECT_EQ(dispatcher.WorkOffAll(), Frames{1}) << "it is given out all the same";
 }
 
 TEST(DispatcherSession, AnOldFrameIsIgnoredAndReportedIfTheCameraIsTheSame) {
@@ -119,7 +139,7 @@ TEST(DispatcherSession, AnOldFrameIsIgnoredAndReportedIfTheCameraIsTheSame) {
 TEST(DispatcherSession, WhatIsTrackedIsPassedOver) {
   Dispatcher dispatcher;
   dispatcher.Calibrate();
-  dispatcher.session.MarkTracked({1});
+  EXPECT_THAT(dispatcher.session.MarkTracked({1}), IsSuccess());
   for (int64_t id = 0; id < 4; ++id) dispatcher.SendOld(id);
   EXPECT_EQ(dispatcher.WorkOffAll(), (Frames{2, 3}));
   EXPECT_EQ(dispatcher.session.num_dropped(), 0);

@@ -14,7 +14,8 @@ constexpr int64_t kSecond = 1'000'000;
 struct Evaluator {
   void SendPoses() {
     for (int64_t frame = 0; frame < 2; ++frame) {
-      session.Receive(PoseEstimate{.frame = {frame}, .state = TrackingState::kTracked}, 7, kSecond);
+      EXPECT_THAT(session.Receive(PoseEstimate{.frame = {frame}, .state = TrackingState::kTracked}, 7, kSecond),
+                  IsSuccess());
     }
   }
   void SendMap() {
@@ -23,8 +24,8 @@ struct Evaluator {
     session.Receive(RemovedInDelta{.delta = 0});
   }
   void SendEnds() {
-    session.Receive(EndOfStream{.stage = StageKind::kTracker, .num_frames = 2, .num_dropped = 1}, kSecond);
-    session.Receive(EndOfStream{.stage = StageKind::kMapper, .num_values = 1}, kSecond);
+    EXPECT_THAT(session.Receive(EndOfStream{StageKind::kTracker, 2, 1}, kSecond), IsSuccess());
+    EXPECT_THAT(session.Receive(EndOfStream{.stage = StageKind::kMapper, .num_values = 1}, kSecond), IsSuccess());
   }
 
   EvaluatorSession session{"evaluator"};
@@ -43,6 +44,38 @@ TEST(EvaluatorSession, WritesOnceWhenAllIsThere) {
   EXPECT_EQ(record.Keyframes().size(), 1U);
   EXPECT_FALSE(evaluator.session.MustWrite(kSecond));
   EXPECT_FALSE(evaluator.session.MayWrite());
+}
+
+TEST(EvaluatorSession, AFrameFarBeyondAllOthersIsNoneOfTheSource) {
+  Evaluator evaluator;
+  EXPECT_FALSE(evaluator.session.Receive(PoseEstimate{.frame = {2'000'000'000}}, 7, kSecond).has_value());
+  evaluator.SendPoses();
+  EXPECT_FALSE(evaluator.session.Receive(PoseEstimate{.frame = {2'000'000'000}}, 7, kSecond).has_value());
+  EXPECT_THAT(evaluator.session.Receive(PoseEstimate{.frame = {108'000}}, 7, kSecond), IsSuccess()) << "an hour later";
+  EXPECT_EQ(evaluator.session.TakeRecord().Frames().size(), 3U);
+}
+
+TEST(EvaluatorSession, AnEndBeforeFramesThatHavePosesIsNone) {
+  Evaluator evaluator;
+  evaluator.SendPoses();
+  evaluator.SendMap();
+  for (const StageKind stage : {StageKind::kTracker, StageKind::kCamera}) {
+    EXPECT_FALSE(evaluator.session.Receive(EndOfStream{.stage = stage, .num_frames = 1}, kSecond).has_value());
+  }
+  EXPECT_FALSE(evaluator.session.MustWrite(kSecond));
+  evaluator.SendEnds();
+  EXPECT_TRUE(evaluator.session.MustWrite(kSecond));
+}
+
+TEST(EvaluatorSession, TellsOfFramesThatNobodyAccountsFor) {
+  Evaluator evaluator;
+  evaluator.SendPoses();
+  evaluator.SendMap();
+  EXPECT_THAT(evaluator.session.Receive(EndOfStream{.stage = StageKind::kCamera, .num_frames = 60}, kSecond),
+              IsSuccess());
+  evaluator.SendEnds();
+  ASSERT_TRUE(evaluator.session.MustWrite(kSecond));
+  EXPECT_EQ(evaluator.session.TakeRecord().Counts().missing, 57) << "two have poses, and one is known to be dropped";
 }
 
 TEST(EvaluatorSession, AReplicaThatHasToBeReplacedIsWaitedFor) {

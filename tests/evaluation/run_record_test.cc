@@ -79,6 +79,33 @@ FrameCounts CountsOf(const std::vector<TrackingState>& states, const std::vector
   return record.Counts();
 }
 
+TEST(RunRecord, FramesOfTheSourceThatLeftNoTraceAreMissing) {
+  RunRecord record;
+  for (const int64_t frame : {10, 11, 13}) record.AddPose({.frame = {frame}}, 0);
+  record.SetSource(10, 15);
+  EXPECT_EQ(record.Counts().missing, 0) << "more may come";
+  record.SetEnd(15, 1);
+  EXPECT_EQ(record.Counts().missing, 1);
+  record.SetEnd(15, 2);
+  EXPECT_EQ(record.Counts().missing, 0);
+}
+
+TEST(RunRecord, ACameraThatWasStartedAgainBeganWithTheFirstPose) {
+  RunRecord record;
+  for (int64_t frame = 0; frame < 20; ++frame) record.AddPose({.frame = {frame}}, 0);
+  record.SetSource(12, 20);
+  record.SetEnd(20, 0);
+  EXPECT_EQ(record.Counts().missing, 0);
+}
+
+TEST(RunRecord, FramesBeforeTheFirstPoseAreMissedToo) {
+  RunRecord record;
+  record.AddPose({.frame = {3}}, 0);
+  record.SetSource(0, 4);
+  record.SetEnd(4, 1);
+  EXPECT_EQ(record.Counts().missing, 2);
+}
+
 TEST(RunRecord, CountsLossesAndWhereTheCameraWasFoundAgain) {
   const FrameCounts blinded = CountsOf({kTracked, kLost, kLost, kTracked, kTracked}, {3});
   EXPECT_EQ(blinded.tracking_failures, 1);
@@ -208,6 +235,15 @@ TEST(RunRecord, AFirstFrameThatWasDroppedHasARowToo) {
   record.SetEnd(3, 1);
   EXPECT_EQ(record.PosePerFrame().size(), 3U);
   EXPECT_TRUE(RunRecord().PosePerFrame().empty());
+}
+
+TEST(RunRecord, FramesThatWereDroppedAtTheEndHaveRowsToo) {
+  RunRecord record;
+  for (int64_t frame = 0; frame < 3; ++frame) record.AddPose({.frame = {frame}}, 0);
+  record.SetSource(0, 60);
+  record.SetEnd(3, 57);
+  EXPECT_EQ(record.PosePerFrame().size(), 60U);
+  EXPECT_EQ(record.Counts().missing, 0);
 }
 
 TEST(RunRecord, WhatComesTwiceCountsOnce) {

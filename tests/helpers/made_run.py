@@ -82,6 +82,7 @@ def _summary(loops: bool) -> dict[str, Any]:
         "messages_repaired": 0,
         "messages_lost": 0,
         "messages_undecodable": 0,
+        "messages_of_strangers": 0,
         "trajectory_sha256": "ab" * 32,
         "map_sha256": "cd" * 32,
         "relocalizations": 2,

@@ -6,7 +6,8 @@ from typing import Any
 from nacl.signing import SigningKey
 
 from tessera_cli.messages import procman_order_t, procman_wish_t
-from tessera_cli.supervision.orders import KEY_BYTES, SIGNATURE_BYTES, OrderVerifier, sign
+from tessera_cli.supervision.orders import OrderVerifier
+from tessera_cli.supervision.signatures import KEY_BYTES, SIGNATURE_BYTES, sign
 
 KEY = SigningKey(bytes(range(32)))
 OTHER_KEY = SigningKey(bytes(range(1, 33)))

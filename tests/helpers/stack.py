@@ -43,6 +43,21 @@ def must_succeed(process: "subprocess.Popen[str]") -> None:
     assert process.returncode == 0, out
 
 
+def pids_of(folder: Path, stage: str = "") -> list[int]:
+    """Processes whose settings are those of the run in `folder`."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if str(folder / "settings.yaml").encode() in words and Path(words[0].decode()).name.startswith(
+            f"tessera-{stage}"
+        ):
+            found.append(int(entry.name))
+    return found
+
+
 @dataclass
 class Finished:
     """A command that has ended."""
@@ -93,14 +108,14 @@ class Tessera:
         finished.folder = folder
         return finished
 
-    def start(self, *arguments: object) -> "subprocess.Popen[str]":
-        """In the background; ends when the test ends it."""
+    def start(self, *arguments: object, **variables: str) -> "subprocess.Popen[str]":
+        """In the background; ends when the test ends it. `variables`: of the environment."""
         return subprocess.Popen(
             self._command_line(arguments),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env=environment(),
+            env={**environment(), **variables},
             stdin=subprocess.DEVNULL,
         )
 

@@ -26,10 +26,10 @@ TEST(StageFigures, StatisticsAreOfAllSteps) {
 TEST(StageFigures, StatisticsAreComputedOnceASecondAndAtTheEnd) {
   StageFigures figures(Identity());
   figures.RecordStep(1.0);
-  EXPECT_EQ(figures.MakeStatus(StageState::kRunning, {}, 0, 2'000'000, false).step.count, 1);
+  EXPECT_EQ(figures.MakeStatus(StageState::kRunning, {}, 0, 0, 2'000'000, false).step.count, 1);
   figures.RecordStep(2.0);
-  EXPECT_EQ(figures.MakeStatus(StageState::kRunning, {}, 0, 2'500'000, false).step.count, 1);
-  EXPECT_EQ(figures.MakeStatus(StageState::kRunning, {}, 0, 2'600'000, true).step.count, 2);
+  EXPECT_EQ(figures.MakeStatus(StageState::kRunning, {}, 0, 0, 2'500'000, false).step.count, 1);
+  EXPECT_EQ(figures.MakeStatus(StageState::kRunning, {}, 0, 0, 2'600'000, true).step.count, 2);
 }
 
 TEST(StageFigures, AStatusNamesItsProcess) {
@@ -38,7 +38,7 @@ TEST(StageFigures, AStatusNamesItsProcess) {
   figures.SetValue("landmarks", 5);
   figures.SetValue("keyframes", 2);
   figures.last_error = std::string(1000, 'x');
-  const StageStatus status = figures.MakeStatus(StageState::kRunning, {.num_repaired = 3, .num_lost = 4}, 5, 1, false);
+  const StageStatus status = figures.MakeStatus(StageState::kRunning, {.num_repaired = 3, .num_lost = 4}, 5, 6, 1, false);
   EXPECT_EQ(status.name, "mapper");
   EXPECT_EQ(status.version, kVersion);
   EXPECT_EQ(status.num_repaired, 3);

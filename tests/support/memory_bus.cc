@@ -170,6 +170,8 @@ void MemoryBus::RunUntilQuiet(double quiet_s) {
   }
 }
 
+Bus& MemoryBus::bus() { return *impl_->bus; }
+
 int MemoryBus::exit_status(const std::string& name) const {
   const Impl::Member* member = impl_->Find(name);
   return member == nullptr ? 0 : member->engine->exit_status_;

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/bus.h"
 #include "runtime/stage.h"
 #include "settings/settings.h"
 
@@ -50,6 +51,9 @@ class MemoryBus {
   bool RunUntil(const std::function<bool()>& done, double timeout_s = 60.0);
   // The same until no stage has sent or received a value for `quiet_s` seconds of that clock.
   void RunUntilQuiet(double quiet_s = 1.0);
+
+  // The bus itself, for bytes that no stage of the test sends.
+  Bus& bus();
 
   // Exit status that a stage asked for by Fail(), and its sentence; 0 and empty if it did not.
   int exit_status(const std::string& name) const;

@@ -47,8 +47,10 @@ CameraStage::CameraStage(StageContext& context)
       frames_(context.Advertise(kCamera)),
       end_of_stream_(context.Advertise(kEndOfStream)) {
   for (const std::string& note : session_.source().notes()) context.Info(note);
-  context.Subscribe(
-      kPose, [this](const PoseEstimate& pose) { session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us()); });
+  num_notes_told_ = session_.source().notes().size();
+  context.Subscribe(kPose, [this](const PoseEstimate& pose) {
+    return session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us());
+  });
   context.WhenIdle([this] { return Step(); });
   context.Every(kTick, [] {});  // lets the idle task look at the clock
   context.Every(std::chrono::seconds(1), [this] {
@@ -75,6 +77,8 @@ bool CameraStage::Step() {
   const CameraActions actions = session_.Advance(context_.now_us());
   timer.reset();
   Do(actions);
+  const std::vector<std::string>& notes = session_.source().notes();
+  for (; num_notes_told_ < notes.size(); ++num_notes_told_) context_.ReportError(notes[num_notes_told_]);
   return true;
 }
 

@@ -22,6 +22,7 @@ class CameraStage {
 
   StageContext& context_;
   CameraSession session_;
+  size_t num_notes_told_ = 0;  // of the source's
   Publisher<CameraCalibration> calibration_;
   Publisher<GroundTruthPose> ground_truth_;
   Publisher<CameraFrame> frames_;

@@ -56,8 +56,9 @@ void DispatcherStage::SubscribeAll() {
     GiveWork();
   });
   context_.Subscribe(kPose, [this](const PoseEstimate& pose) {
-    session_.MarkTracked(pose.frame);
+    Result<> marked = session_.MarkTracked(pose.frame);
     GiveWork();
+    return marked;
   });
   context_.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
     if (end.stage == StageKind::kCamera) session_.Receive(end, context_.now_us());

@@ -21,8 +21,9 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
           }) {
   if (!out_dir_.empty()) MakeRunFolder(out_dir_);  // now, so that a wrong path is found before the run
   context.Subscribe(kPose, [this](const PoseEstimate& pose, const MessageInfo& info) {
-    session_.Receive(pose, info.publish_us, context_.now_us());
+    Result<> received = session_.Receive(pose, info.publish_us, context_.now_us());
     FinishIfDone();
+    return received;
   });
   context.Subscribe(kRemovedKeyframes, [this](const RemovedInDelta& removed) {
     session_.Receive(removed);
@@ -30,9 +31,10 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
   });
   context.Subscribe(kGroundTruth, [this](const GroundTruthPose& truth) { session_.Receive(truth); });
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
-    session_.Receive(end, context_.now_us());
-    map_.Receive(end);
+    Result<> received = session_.Receive(end, context_.now_us());
+    if (received) map_.Receive(end);
     FinishIfDone();
+    return received;
   });
   context.Subscribe(kStatus, [this](const StageStatus& status) { session_.Receive(status, context_.now_us()); });
   context.Every(std::chrono::milliseconds(50), [this] { FinishIfDone(); });

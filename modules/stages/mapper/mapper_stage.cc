@@ -8,6 +8,10 @@
 namespace tessera {
 namespace {
 
+// Many followers that build the map anew at once are answered; a flood of requests does not keep it from its work.
+constexpr double kAnswersPerSecond = 300;
+constexpr double kAnswersAtOnce = 50;
+
 MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
   MapperSessionOptions options;
   options.mapper.window.max_inner_keyframes = settings.max_inner_keyframes;
@@ -23,6 +27,7 @@ MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
 
 MapperStage::MapperStage(StageContext& context)
     : context_(context),
+      answering_(kAnswersPerSecond, kAnswersAtOnce),
       session_(OptionsFrom(context.settings().Get<MapperSettings>())),
       deltas_(context.Advertise(kMapDelta)),
       pages_(context.Advertise(kMapSnapshot)),
@@ -36,7 +41,9 @@ MapperStage::MapperStage(StageContext& context)
   Receive(kKeyframe);
   Receive(kLoopResult);
   Receive(kGlobalAdjustment);
-  Receive(kMapRequest);
+  context.Subscribe(kMapRequest, [this](const MapRequest& request) {
+    if (answering_.Take(1, context_.now_us())) Do(session_.Receive(request));
+  });
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
     if (end.stage != StageKind::kTracker) return;
     Do(session_.Receive(end));

@@ -2,6 +2,7 @@
 // between them stands in mapping/mapper_session.h.
 #pragma once
 
+#include "core/rate_limit.h"
 #include "mapping/mapper_session.h"
 #include "runtime/stage.h"
 
@@ -19,6 +20,7 @@ class MapperStage {
   void Do(const MapperActions& actions);
 
   StageContext& context_;
+  RateLimit answering_;  // requests of followers, who ask again
   MapperSession session_;
   Publisher<MapDelta> deltas_;
   Publisher<MapSnapshotPage> pages_;

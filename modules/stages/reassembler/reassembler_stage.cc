@@ -1,5 +1,7 @@
 #include "stages/reassembler/reassembler_stage.h"
 
+#include <string>
+
 #include "features/selection.h"
 #include "messages/tracking_types.h"
 
@@ -8,6 +10,8 @@ namespace {
 
 // Frames that wait for tiles; more than that means that the dispatcher's flow control failed.
 constexpr int kMaxOpenFrames = 64;
+// One that was started again hears of frames one by one; a larger step is none of this pipeline.
+constexpr int64_t kMaxFramesAhead = 100'000;
 
 }  // namespace
 
@@ -17,9 +21,15 @@ ReassemblerStage::ReassemblerStage(StageContext& context) : context_(context), a
   end_of_stream_ = context.Advertise(kEndOfStream);
   context.Subscribe(kTileFeatures, [this](const TileFeatures& tile) { OnTile(tile); });
   // One that was started again goes on behind what is tracked.
-  context.Subscribe(kPose, [this](const PoseEstimate& pose) {
+  context.Subscribe(kPose, [this](const PoseEstimate& pose) -> Result<> {
+    const FrameId last = assembler_.last_released();
+    if (last.valid() && pose.frame.value > last.value + kMaxFramesAhead) {
+      return Failed("its frame " + std::to_string(pose.frame.value) + " is far beyond " + std::to_string(last.value) +
+                    ", the last one released");
+    }
     assembler_.SkipTo(pose.frame);
     Release();
+    return {};
   });
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
     if (end.stage == StageKind::kDispatcher) {

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
-from tessera_cli.cluster.keys import KeyRing, key_folder
+from tessera_cli.cluster.keys import KeyRing, key_folder, to_text
 from tessera_cli.cluster.node_facts import (
     NodeFacts,
     Problem,
@@ -87,13 +87,14 @@ def files_to_copy(is_built: bool) -> list[str]:
 
 def find_requirements() -> Requirements:
     """What nodes must have to run what this machine asks for."""
-    packages = read_packages(PROCMAN / "packages.txt")
+    packages, ring = read_packages(PROCMAN / "packages.txt"), KeyRing(key_folder())
     return Requirements(
         local=parse_facts(probe([], str(ROOT), packages).stdout),
         packages=packages,
         requirements=hashlib.sha256((PROCMAN / "requirements.txt").read_bytes()).hexdigest(),
-        key=KeyRing(key_folder()).own_public_key(),
+        key=ring.own_public_key(),
         key_name=own_key_name(getpass.getuser(), os.uname().nodename),
+        trusted=frozenset(map(to_text, ring.trusted().values())),
     )
 
 

@@ -1,8 +1,8 @@
 """The keys that decide whose orders deputies obey: Ed25519, by PyNaCl.
 
 The folder ~/.config/tessera (or TESSERA_KEYS) holds `sheriff.key`, this user's secret key, and `trusted_keys`, rows of
-NAME PUBLIC-KEY whose orders a deputy of this user obeys. Both are created when first needed, and the user's own key is
-the first one trusted: on a single machine nothing has to be set up.
+NAME PUBLIC-KEY whose orders a deputy of this user obeys, and whose deputies' words this user believes. Both are
+created when first needed, and the user's own key is the first one trusted: on one machine nothing has to be set up.
 """
 
 import base64

@@ -6,6 +6,7 @@ import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tessera_cli.cluster.keys import OWN_NAME
 from tessera_cli.constants import RECEIVE_BUFFER_BYTES
 
 PROBE = Path(__file__).with_name("probe.sh")
@@ -29,6 +30,7 @@ class NodeFacts:
     programs: set[str] = field(default_factory=set)
     packages: set[str] = field(default_factory=set)  # of those asked for, the installed ones
     trusted: set[str] = field(default_factory=set)  # public keys
+    own_key: str = ""  # the public key of the user there, which its deputy signs with; empty: it has none yet
     home: str = ""  # the folder as an absolute path; empty: there is none
     is_git: bool = False
     deployed: list[str] = field(default_factory=list)  # files that an earlier deploy copied
@@ -47,6 +49,7 @@ class Requirements:
     requirements: str  # digest of requirements.txt
     key: str  # this user's public one
     key_name: str
+    trusted: frozenset[str] = frozenset()  # public keys that this user trusts, besides its own
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,8 @@ def parse_facts(text: str) -> NodeFacts:
                 getattr(facts, word + "s").add(value)
             case "trusted" if len(words := value.partition("#")[0].split()) == 2:
                 facts.trusted.add(words[1])
+                if words[0] == OWN_NAME:
+                    facts.own_key = words[1]
             case "git":
                 facts.is_git = True
             case "deployed":
@@ -146,6 +151,9 @@ def missing_requirements(facts: NodeFacts, required: Requirements) -> list[Probl
     if required.key not in facts.trusted:
         command = f"procman/tessera keys trust {required.key_name} {required.key}"
         found.append(Problem(f"it does not trust this user's key; do there, when it is set up: {command}"))
+    if facts.own_key and facts.own_key not in required.trusted | {required.key}:
+        command = f"procman/tessera keys trust {own_key_name('me', facts.host or 'node')} {facts.own_key}"
+        found.append(Problem(f"this user does not trust its key, and would not believe its deputy; do here: {command}"))
     return found
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tessera_cli.report.html_report import write_report
-from tessera_cli.report.sentences import headline, remarks
+from tessera_cli.report.sentences import headline, remarks, strangers_sentence
 from tessera_cli.report.terminal_plot import draw_from_above
 from tessera_cli.report.trajectory_plot import plot_trajectory
 from tessera_cli.runs.run_folder import Result, Summary
@@ -75,6 +75,8 @@ def _lines(summary: Summary) -> list[str]:
         f"messages: {summary['messages_repaired']} repaired, {summary['messages_lost']} lost, "
         f"{summary['messages_undecodable']} undecodable; extractor restarts: {summary['extractor_restarts']}"
     )
+    if strangers := summary.get("messages_of_strangers"):
+        lines.append(strangers_sentence(strangers))
     return lines + [f"warning: {warning}" for warning in summary["warnings"]]
 
 

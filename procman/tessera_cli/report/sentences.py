@@ -156,4 +156,11 @@ def _messages(summary: Summary) -> list[str]:
         was = "was" if undecodable == 1 else "were"
         invalid = f"{count(undecodable, 'message')} could not be decoded and {was} ignored"
         found.append(f"{invalid}: does another program use this bus?")
+    if strangers := summary.get("messages_of_strangers"):
+        found.append(strangers_sentence(strangers))
     return found
+
+
+def strangers_sentence(num_messages: int) -> str:
+    was = "was" if num_messages == 1 else "were"
+    return f"{count(num_messages, 'message')} of strangers {was} passed over: they changed nothing."

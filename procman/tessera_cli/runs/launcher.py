@@ -7,6 +7,7 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.constants import (
     ADJUSTMENT_TIMEOUT_S,
     DRAIN_TIMEOUT_S,
@@ -17,6 +18,7 @@ from tessera_cli.constants import (
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.files import PROCMAN
 from tessera_cli.interrupt import Interrupt
+from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
 from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run
 from tessera_cli.runs.run_settings import run_assignments
@@ -25,11 +27,12 @@ from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summ
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import read_process_list
-from tessera_cli.supervision.stack_monitor import StackMonitor
+from tessera_cli.supervision.stack_monitor import StackMonitor, hear_heartbeats, is_of_this_machine
 from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.versions import tessera_version
 
 PROCESS_LIST = PROCMAN / "local.pmd"
+BUSY_BUS = "another stack runs on this bus: end it, or give --port N to keep the two apart."
 # Stages whose long steps frames may have to wait for.
 MAP_STAGES = ("mapper", "loop_closer", "global_adjuster")
 
@@ -43,8 +46,29 @@ def run_stack(arguments: Namespace, present: Present) -> int:
     process_list = read_process_list(PROCESS_LIST, _counts(arguments, source))
     assignments = process_list.settings + run_assignments(arguments, source, folder)
     values = write_settings(assignments, folder / "settings.yaml")
-    deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
-    return Launcher(arguments, source, folder, values, deputy, present).run()
+    run_dir = _take_bus(arguments, source, values)
+    try:
+        deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
+        return Launcher(arguments, source, folder, values, deputy, present).run()
+    finally:
+        if run_dir:
+            run_dir.end()
+
+
+def _take_bus(arguments: Namespace, source: Source, values: Settings) -> RunDir | None:
+    """The folder of the run, with its secret. Raises UserError if another stack of this machine uses the bus."""
+    bus = values["bus"]
+    run_dir = RunDir(Path(bus["run_dir"])) if bus["run_dir"] else None
+    if run_dir:
+        run_dir.lock(BUSY_BUS)
+    shares_extractors = arguments.extractors == 0
+    for heartbeat in hear_heartbeats(bus["main_url"], bus["channel_prefix"]) if source.has_camera_process else []:
+        is_of_pool = shares_extractors and heartbeat.header.publisher.startswith("extractor")
+        if is_of_this_machine(heartbeat) and not is_of_pool:
+            raise UserError(BUSY_BUS)
+    if run_dir:
+        run_dir.make(pool_secret(key_folder()) if shares_extractors else draw_secret())
+    return run_dir
 
 
 def _counts(arguments: Namespace, source: Source) -> dict[str, int]:
@@ -73,8 +97,8 @@ class Launcher:
         self._folder = folder
         self._deputy = deputy
         self._present = present
-        bus, shares_extractors = values["bus"], arguments.extractors == 0
-        self._monitor = StackMonitor(bus["main_url"], bus["channel_prefix"], deputy.owns, shares_extractors)
+        bus = values["bus"]
+        self._monitor = StackMonitor(bus["main_url"], bus["channel_prefix"], deputy.owns, secret_of(values))
         self._interrupt = Interrupt()
         self._num_warnings_shown = 0
         self._map_busy_at = 0.0  # monotonic seconds
@@ -98,8 +122,9 @@ class Launcher:
             raise
         finally:
             self._deputy.kill()
-        print(self._present(self._summarize(self._wall_s(began), ended), self._folder))
-        return 0 if ended == "complete" or self._source.is_live else 1
+        result = self._summarize(self._wall_s(began), ended)
+        print(self._present(result, self._folder))
+        return 0 if result.summary["ended"] == "complete" or self._source.is_live else 1
 
     def _wall_s(self, began: float) -> float:
         """From the camera's start to the last pose."""
@@ -108,8 +133,6 @@ class Launcher:
 
     def _start(self, view: RunView) -> None:
         """Returns when all are ready except the camera, which has just been started: it depends on all others."""
-        if self._source.has_camera_process and not self._monitor.is_free():
-            raise UserError("another stack runs on this bus: end it, or give --port N to keep the two apart.")
         self._deputy.start()
         deadline = time.monotonic() + START_TIMEOUT_S
         while waiting := [name for name in self._deputy.not_ready if name != "camera"]:
@@ -158,8 +181,6 @@ class Launcher:
         if ended := self._deputy.ended:
             last_line = self._deputy.last_line(ended[0])
             raise RunError(f"{ended[0]} ended before the run did; the last line of its log: {last_line}")
-        if foreign := self._monitor.foreign:
-            raise UserError(f"another stack runs on this bus ({foreign}): end it, or give --port N to keep them apart.")
         for warning in self._deputy.warnings[self._num_warnings_shown :]:
             view.say(warning)
         self._num_warnings_shown = len(self._deputy.warnings)
@@ -187,6 +208,7 @@ class Launcher:
             wall_s=wall_s,
             ended=ended,
             messages_undecodable=sum(report.undecodable for report in reports),
+            messages_of_strangers=self._monitor.num_strangers + sum(report.strangers for report in reports),
         )
         process_facts = ProcessFacts(
             cpu_s={process.name: process.cpu_s for process in processes},

@@ -3,9 +3,11 @@
 from argparse import Namespace
 from pathlib import Path
 
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.errors import UserError
 from tessera_cli.files import absolute
 from tessera_cli.lcm_bus import bus_url
+from tessera_cli.membership import run_dir_of
 from tessera_cli.runs.sources import Source
 from tessera_cli.settings import network_assignments
 
@@ -42,6 +44,8 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
     pace = arguments.pace or ("realtime" if source.is_live else "lockstep")
     assignments = source_assignments(arguments, source) + _bus_assignments(source, arguments.port)
     assignments += [f"camera.pace={pace}", f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
+    run_dir = run_dir_of(key_folder(), bus_url(arguments.port), arguments.prefix)
+    assignments += [f"bus.run_dir={run_dir.path}", f"bus.camera_is_member={str(source.has_camera_process).lower()}"]
     if arguments.prefix:
         assignments.append(f"bus.channel_prefix={arguments.prefix}")
     if arguments.live:

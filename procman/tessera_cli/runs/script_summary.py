@@ -35,6 +35,7 @@ class ScriptWatcher:
         self._monitor = ListMonitor(values["bus"]["main_url"], values["bus"]["channel_prefix"])
         self._usages: dict[tuple[str, int], ProcessUsage] = {}  # by process and number of its start
         self._earlier_starts: dict[str, int] = {}  # before this run
+        self.ended = ""  # as in summary.json; empty: nothing was summed up
         self._camera_at: float | None = None  # monotonic seconds
         self._evaluator: procman_status_t | None = None  # of its deputy, when it had finished
         sheriff.also_listen_to([self._monitor.bus])
@@ -70,7 +71,9 @@ class ScriptWatcher:
             )
         folder = Path(out_dir)
         write_settings(self._assignments, folder / "settings.yaml")
-        return present(write_summary(folder, self._run_facts(folder), self._process_facts()), folder)
+        result = write_summary(folder, self._run_facts(folder), self._process_facts())
+        self.ended = result.summary["ended"]
+        return present(result, folder)
 
     def _run_facts(self, folder: Path) -> RunFacts:
         extractors = {name for (name, _), usage in self._usages.items() if usage.command == "extractor"}
@@ -82,6 +85,7 @@ class ScriptWatcher:
             wall_s=self._wall_s(folder),
             ended="complete",
             messages_undecodable=sum(report.undecodable for report in self._monitor.reports.values()),
+            messages_of_strangers=sum(report.strangers for report in self._monitor.reports.values()),
         )
 
     def _wall_s(self, folder: Path) -> float:

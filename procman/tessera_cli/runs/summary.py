@@ -24,6 +24,7 @@ EVALUATOR_KEYS = (
     "frames_lost",
     "frames_initializing",
     "frames_dropped",
+    "frames_missing",
     "tracking_failures",
     "relocalizations",
     "keyframes",
@@ -57,6 +58,7 @@ class RunFacts:
     wall_s: float  # from the camera's start to the last pose
     ended: str  # "complete", "interrupted", or the sentence of a failure
     messages_undecodable: int
+    messages_of_strangers: int  # that were passed over; each process counts what it hears
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "sensor": facts.sensor,
         "extractors": facts.extractors,
         "tiles": facts.tiles,
-        "ended": facts.ended,
+        "ended": judge_end(facts.ended, evaluated),
         **{key: evaluated.get(key) for key in EVALUATOR_KEYS},
         "rms_error_m": result.error.rms_m if result.error else None,
         "alignment": _describe_alignment(result),
@@ -87,12 +89,22 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "cpu_s": {name: round(cpu_s, 3) for name, cpu_s in processes.cpu_s.items()},
         "max_rss_mb": {name: round(rss_mb, 1) for name, rss_mb in processes.max_rss_mb.items()},
         "messages_undecodable": facts.messages_undecodable,
+        "messages_of_strangers": facts.messages_of_strangers,
         "extractor_restarts": processes.num_extractor_restarts,
         "warnings": processes.warnings + scale_warnings(result.frames, facts.sensor),
         "versions": collect_versions(),
     }
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     return replace(result, summary=summary)
+
+
+def judge_end(ended: str, evaluated: dict[str, Any]) -> str:
+    """A run is complete if every frame that the camera sent has a pose, or is known to be lost or dropped."""
+    missing = evaluated.get("frames_missing") or 0
+    if ended != "complete" or missing == 0:
+        return ended
+    were = "frame is" if missing == 1 else "frames are"
+    return f"incomplete: {missing} {were} not accounted for, of {evaluated['frames'] + missing} that the camera sent"
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:

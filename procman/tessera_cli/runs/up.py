@@ -6,16 +6,18 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.files import absolute
 from tessera_cli.lcm_bus import is_on_lan
+from tessera_cli.membership import LOCAL_RUN_DIR, draw_secret, pool_secret, run_dir_of
 from tessera_cli.runs.script_summary import ScriptWatcher
 from tessera_cli.runs.summary import Present
 from tessera_cli.settings import Settings, network_assignments, write_settings
 from tessera_cli.supervision.process_list import ProcessList, read_process_list
 from tessera_cli.supervision.process_names import LIST_NAME
-from tessera_cli.supervision.script_runner import ScriptRunner
+from tessera_cli.supervision.script_runner import ScriptRunner, hosts_of
 from tessera_cli.supervision.sheriff import Sheriff
 
 
@@ -28,11 +30,11 @@ def up(arguments: Namespace, present: Present) -> int:
     name = _name(arguments)
     assignments = _assignments(process_list, arguments)
     values = _merge(assignments)
-    sheriff = Sheriff(arguments)
-    runner = ScriptRunner(sheriff, name, process_list, assignments, say)
-    sheriff.require_deputies(runner.hosts)
+    sheriff, hosts = Sheriff(arguments), hosts_of(process_list)
+    sheriff.require_deputies(hosts)
     sheriff.discover_deputies()
     _refuse_clash(sheriff, name, process_list, values["bus"])
+    runner = ScriptRunner(sheriff, name, process_list, assignments, _secret(sheriff, process_list, values), say)
     runner.end_on_other_hosts()
     began = time.monotonic()
     if arguments.script:
@@ -41,11 +43,11 @@ def up(arguments: Namespace, present: Present) -> int:
         say(f"script {arguments.script} ended well after {time.monotonic() - began:.1f} s")
         if words := watcher.sum_up(present):
             print(words)
-        return 0
+        return 0 if watcher.ended in ("", "complete") else 1
     names = list(process_list.processes)
     runner.start(names)
     runner.wait(names, "ready", arguments.timeout)
-    say(f"{len(names)} processes on {len(runner.hosts)} nodes are ready after {time.monotonic() - began:.1f} s")
+    say(f"{len(names)} processes on {len(hosts)} nodes are ready after {time.monotonic() - began:.1f} s")
     return 0
 
 
@@ -60,6 +62,7 @@ def _name(arguments: Namespace) -> str:
 def _assignments(process_list: ProcessList, arguments: Namespace) -> list[str]:
     """All settings of the run that differ from the defaults."""
     assignments = network_assignments(arguments.port, is_on_lan(arguments)) + process_list.settings
+    assignments.append(f"bus.run_dir={LOCAL_RUN_DIR}")
     if arguments.out:
         assignments.append(f"evaluator.out_dir={absolute(arguments.out)}")
     return assignments + arguments.settings
@@ -69,6 +72,39 @@ def _merge(assignments: list[str]) -> Settings:
     """All settings. Raises UserError if one is wrong."""
     with tempfile.TemporaryDirectory() as folder:
         return write_settings(assignments, Path(folder) / "settings.yaml")
+
+
+def _secret(sheriff: Sheriff, process_list: ProcessList, values: Settings) -> bytes | None:
+    """Of the members of the list; None with `bus.run_dir=`, where messages are neither signed nor checked.
+
+    What runs on this bus already keeps its secret, so that another `up` need not start it again; else it is a new one.
+    It is left in this user's folder, for commands that listen to the list.
+    """
+    bus = values["bus"]
+    if bus["run_dir"] != LOCAL_RUN_DIR:
+        if bus["run_dir"]:
+            raise UserError("bus.run_dir is made by each deputy: leave it out, or give --set bus.run_dir= for none.")
+        return None
+    run_dir = run_dir_of(key_folder(), bus["main_url"], bus["channel_prefix"])
+    known = run_dir.secret() if _is_in_use(sheriff, bus) else None
+    has_extractors = any(process.command == "extractor" for process in process_list.processes.values())
+    if values["extractor"]["robots"] or not has_extractors:
+        known = pool_secret(key_folder())
+    run_dir.lock(f"a stack of `tessera run` is on the bus {bus['main_url']}: end it, or give --port N.")
+    secret = known or draw_secret()
+    run_dir.make(secret)
+    run_dir.unlock()
+    return secret
+
+
+def _is_in_use(sheriff: Sheriff, bus: dict[str, Any]) -> bool:
+    """Whether processes of a list speak on this bus, with these channels."""
+    lists = [each for deputy in sheriff.deputies.values() for each in deputy.status.lists]
+    return any(
+        (each.main_url, each.channel_prefix) == (bus["main_url"], bus["channel_prefix"])
+        and any(process.pid for process in each.processes)
+        for each in lists
+    )
 
 
 def _refuse_clash(sheriff: Sheriff, name: str, process_list: ProcessList, bus: dict[str, Any]) -> None:

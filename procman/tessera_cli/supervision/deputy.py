@@ -11,8 +11,11 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from nacl.exceptions import CryptoError
+from nacl.public import SealedBox
+
 from tessera_cli import settings
-from tessera_cli.cluster.keys import KeyRing, key_folder
+from tessera_cli.cluster.keys import KeyRing, from_text, key_folder
 from tessera_cli.console import say
 from tessera_cli.constants import (
     DEPUTY_STATUS_PERIOD_S,
@@ -30,11 +33,13 @@ from tessera_cli.supervision.attributes import HOST
 from tessera_cli.supervision.child_process import Launch
 from tessera_cli.supervision.command_list import read_command_list
 from tessera_cli.supervision.deputy_status import make_status
+from tessera_cli.supervision.deputy_words import DeputyWords
 from tessera_cli.supervision.guard import Guard
 from tessera_cli.supervision.orders import OrderVerifier
 from tessera_cli.supervision.output_forwarder import OutputForwarder
 from tessera_cli.supervision.process_names import LIST_NAME, full_name, split_name
 from tessera_cli.supervision.running_list import RunningList, listen_to
+from tessera_cli.supervision.signatures import sign
 from tessera_cli.supervision.state_folder import StateFolder
 from tessera_cli.supervision.supervisor import Supervisor
 from tessera_cli.supervision.wishes import run_of, to_launch
@@ -63,10 +68,13 @@ class Deputy:
         self._commands = read_command_list(commands_path)
         self._ring = KeyRing(key_folder())
         self._ring.trusted()  # an error in the file is reported now
+        self._key = self._ring.signing_key()
         self._verifier = OrderVerifier(deputy_id, self._trusted_keys)
-        self._bus = Bus(url, f"deputy_{deputy_id}")
+        self._words = DeputyWords(self._believed_keys)
+        epoch_us, self._earlier_epochs = folder.begin_epoch()
+        self._bus = Bus(url, f"deputy_{deputy_id}", epoch_us)
         self._lists: dict[str, RunningList] = {}
-        self._output = OutputForwarder(self._bus, deputy_id)
+        self._output = OutputForwarder(self._bus, deputy_id, self._key)
         self._supervisor = Supervisor(folder, self._output.add)
         self._last_order, self._last_refusal = "", ""
         self._num_restarts = 0
@@ -78,7 +86,7 @@ class Deputy:
     def run(self, resumes: bool) -> int:
         """Until a signal. `resumes`: begins with the last orders. Returns 0 if no process is left."""
         interrupt = Interrupt()
-        self._bus.subscribe(PROCMAN_STATUS, procman_status_t, self._on_deputy)
+        self._bus.subscribe(PROCMAN_STATUS, None, self._on_deputy)
         self._look_for_duplicates()
         self._bus.subscribe(PROCMAN_ORDER, None, self._on_order)
         guard = Guard(self._folder.mark())
@@ -104,6 +112,10 @@ class Deputy:
         except (UserError, OSError, UnicodeDecodeError) as error:
             self._key_error = str(error)
             return []
+
+    def _believed_keys(self) -> set[bytes]:
+        """Of deputies: trusted ones, and those that a sheriff who was obeyed has named."""
+        return set(self._trusted_keys()).union(*(each.keys for each in self._lists.values()))
 
     def _look_for_duplicates(self) -> None:
         until = time.monotonic() + DUPLICATE_DEPUTY_S
@@ -131,8 +143,12 @@ class Deputy:
             self._published = content
             self._publish_status()
 
-    def _on_deputy(self, status: procman_status_t) -> None:
-        if status.deputy == self._id and status.nonce != self._verifier.nonce:
+    def _on_deputy(self, data: bytes) -> None:
+        status = self._words.accept(procman_status_t, data)
+        # What this deputy said in an earlier life, somebody may have kept.
+        if status is None or (status.deputy == self._id and status.header.epoch_us in self._earlier_epochs):
+            return
+        if status.deputy == self._id and bytes(status.nonce) != self._verifier.nonce:
             if not self._duplicate_host:
                 say(f"another deputy with the id {self._id} runs on {status.host}")
             self._duplicate_host = status.host
@@ -199,10 +215,11 @@ class Deputy:
             raise UserError("two wishes have the same name.")
         if not LIST_NAME.fullmatch(order.list):
             raise UserError(f"'{order.list}' is no valid name of a list.")
-        run = run_of(order.settings)
+        secret = self._open_secret(order)
+        run = run_of(order.settings, secret)
         launches = self._launches(order, run)
         if order.list not in self._lists or run != self._lists[order.list].run:
-            self._begin(order.list, run, order.settings)
+            self._begin(order, run, secret)
         self._forget_ended(order.list)
         self._supervisor.set_wanted(launches, order.session, full_name(order.list, ""))
 
@@ -216,10 +233,28 @@ class Deputy:
             launches[name] = to_launch(wish, self._commands, values, run, generations.get(name, 0), order.list)
         return launches
 
-    def _begin(self, list_name: str, run: str, assignments: list[str]) -> None:
+    def _open_secret(self, order: procman_order_t) -> bytes | None:
+        """Of the list's members; None if they do without. Raises UserError if it is not meant for this deputy."""
+        if not order.num_secret_bytes:
+            return None
+        try:
+            return SealedBox(self._key.to_curve25519_private_key()).decrypt(bytes(order.secret))
+        except (CryptoError, ValueError) as error:
+            raise UserError(f"the order's secret is sealed for another key than that of {self._id}.") from error
+
+    def _begin(self, order: procman_order_t, run: str, secret: bytes | None) -> None:
+        run_dir = self._folder.run_dir(order.list)
+        assignments = [*order.settings, f"bus.run_dir={run_dir.path if secret else ''}"]
         merged = settings.write_settings(assignments, self._folder.settings_path(run))
-        self._lists[list_name] = listen_to(list_name, run, merged, f"deputy_{self._id}", self._on_stage)
-        self._supervisor.forget_remote_states(full_name(list_name, ""))
+        if secret:
+            run_dir.make(secret)
+        try:
+            keys = frozenset(from_text(text) for text in order.deputy_keys)
+        except ValueError as error:
+            raise UserError(f"a key of the list's deputies is none: {error}.") from error
+        publisher = f"deputy_{self._id}"
+        self._lists[order.list] = listen_to(order.list, run, merged, keys, publisher, self._on_stage)
+        self._supervisor.forget_remote_states(full_name(order.list, ""))
         self._folder.keep_settings({each.run for each in self._lists.values()})
 
     def _end(self, list_name: str, session: str) -> None:
@@ -242,4 +277,4 @@ class Deputy:
         header, lists = self._bus.header(PROCMAN_STATUS), self._lists.values()
         status = make_status(header, self._verifier, lists, self._supervisor.processes, self._status_at)
         status.last_order, status.last_refusal = self._last_order, self._last_refusal
-        self._bus.publish(PROCMAN_STATUS, status.encode())
+        self._bus.publish(PROCMAN_STATUS, sign(status, self._key))

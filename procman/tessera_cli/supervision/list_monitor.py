@@ -1,18 +1,24 @@
 """Listens to the stages of one process list on their own bus, whichever node they are on."""
 
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.constants import POSE, STATUS
 from tessera_cli.lcm_bus import Bus
+from tessera_cli.membership import run_dir_of
 from tessera_cli.messages import pose_t, stage_status_t
 from tessera_cli.supervision.progress import Progress, StageReport, format_duration, is_tracker_pose, to_report
 
 
 class ListMonitor:
-    """Keeps the last report of each stage and the progress of the current run."""
+    """Keeps the last report of each stage and the progress of the current run.
+
+    It believes members only if this user has started the list on this machine, or another has left its secret here.
+    """
 
     def __init__(self, main_url: str, channel_prefix: str) -> None:
+        secret = run_dir_of(key_folder(), main_url, channel_prefix).secret()
         self.bus = Bus(main_url, "watch")
-        self.bus.subscribe(channel_prefix + STATUS, stage_status_t, self._on_status)
-        self.bus.subscribe(channel_prefix + POSE, pose_t, self._on_pose)
+        self.bus.subscribe(channel_prefix + STATUS, stage_status_t, self._on_status, secret)
+        self.bus.subscribe(channel_prefix + POSE, pose_t, self._on_pose, secret)
         self.reports: dict[tuple[str, int], StageReport] = {}  # by name and process
         self.progress = Progress()
 

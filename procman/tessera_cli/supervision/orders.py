@@ -1,24 +1,15 @@
-"""Signs orders, and decides which of those received are obeyed.
-
-  signature = Ed25519(secret key, "tessera procman order" + encoded order without its last 64 bytes)
-
-The last 96 bytes of an encoded order are its key and its signature. They are checked before anything is decoded.
-"""
+"""Decides which of the orders that a deputy receives are obeyed."""
 
 import secrets
 from collections import Counter
 from collections.abc import Callable, Iterable
 
-from nacl.exceptions import BadSignatureError
-from nacl.signing import SigningKey, VerifyKey
+from tessera_cli.messages import procman_order_t
+from tessera_cli.supervision.signatures import authenticate
 
-from tessera_cli.constants import MAX_ORDER_BYTES
-from tessera_cli.messages import decode, procman_order_t
-
-CONTEXT = b"tessera procman order"  # the signature of anything else is not valid for an order
-KEY_BYTES, SIGNATURE_BYTES, NONCE_BYTES = 32, 64, 16
-MIN_BYTES = 8 + KEY_BYTES + SIGNATURE_BYTES
-FINGERPRINT = procman_order_t().encode()[:8]
+NONCE_BYTES = 16
+# Each order of a sheriff has the next number. One far beyond would leave no room for those after it.
+MAX_NUMBER_STEP = 1_000_000
 
 
 def draw_nonce() -> bytes:
@@ -27,14 +18,6 @@ def draw_nonce() -> bytes:
 
 def draw_order_id() -> str:
     return secrets.token_hex(8)
-
-
-def sign(order: procman_order_t, key: SigningKey) -> bytes:
-    """The encoded order; its key and signature are filled in."""
-    order.key, order.signature = key.verify_key.encode(), bytes(SIGNATURE_BYTES)
-    signed = order.encode()[:-SIGNATURE_BYTES]
-    order.signature = key.sign(CONTEXT + signed).signature
-    return signed + order.signature
 
 
 class OrderVerifier:
@@ -52,38 +35,29 @@ class OrderVerifier:
 
     def accept(self, data: bytes) -> procman_order_t | None:
         """The order if it is to be obeyed. It is accepted once: the same bytes are a replay from then on."""
-        order, refusal = self._authenticate(data)
+        order, refusal = authenticate(procman_order_t, data, set(self._trusted()))
         if order is None:
             self.refused[refusal] += 1
             return None
         if order.deputy != self.deputy:
             self.num_for_others += 1
             return None
-        if order.nonce != self.nonce or order.number <= self.last_number:
-            self.refused["stale" if order.nonce != self.nonce else "replayed"] += 1
+        if refusal := self._judge_number(order):
+            self.refused[refusal] += 1
             return None
         self.last_number = order.number
         self.num_accepted += 1
         return order
 
+    def _judge_number(self, order: procman_order_t) -> str:
+        """The kind of refusal; empty: none."""
+        if order.nonce != self.nonce:
+            return "stale"
+        if order.number <= self.last_number:
+            return "replayed"
+        return "implausible" if order.number > self.last_number + MAX_NUMBER_STEP else ""
+
     def accept_again(self, data: bytes) -> procman_order_t | None:
         """An order for this deputy that it accepted before its restart, if its key is still trusted."""
-        order, _ = self._authenticate(data)
+        order, _ = authenticate(procman_order_t, data, set(self._trusted()))
         return order if order is not None and order.deputy == self.deputy else None
-
-    def _authenticate(self, data: bytes) -> tuple[procman_order_t | None, str]:
-        """An order signed by a trusted key, or the kind of refusal."""
-        if not MIN_BYTES <= len(data) <= MAX_ORDER_BYTES or data[:8] != FINGERPRINT:
-            return None, "malformed"
-        signed, signature = data[:-SIGNATURE_BYTES], data[-SIGNATURE_BYTES:]
-        key = signed[-KEY_BYTES:]
-        if not any(signature):
-            return None, "unsigned"
-        if key not in self._trusted():
-            return None, "unknown key"
-        try:
-            VerifyKey(key).verify(CONTEXT + signed, signature)
-        except BadSignatureError:
-            return None, "forged"
-        order = decode(procman_order_t, data)
-        return order, "" if order else "malformed"

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
+from nacl.signing import SigningKey
+
 from tessera_cli.constants import MAX_OUTPUT_BYTES, OUTPUT_PERIOD_S, PROCMAN_OUTPUT, TAIL_PIECE_BYTES
 from tessera_cli.lcm_bus import Bus
 from tessera_cli.messages import procman_output_t
+from tessera_cli.supervision.signatures import sign
 
 
 @dataclass
@@ -17,8 +20,8 @@ class _Pending:
 class OutputForwarder:
     """Of one deputy, for all its processes."""
 
-    def __init__(self, bus: Bus, deputy: str) -> None:
-        self._bus, self._deputy = bus, deputy
+    def __init__(self, bus: Bus, deputy: str, key: SigningKey) -> None:
+        self._bus, self._deputy, self._key = bus, deputy, key
         self._pending: dict[str, _Pending] = {}
         self._due_at = 0.0
 
@@ -54,4 +57,4 @@ class OutputForwarder:
         output.header = self._bus.header(PROCMAN_OUTPUT)
         output.deputy, output.process, output.order = self._deputy, process, order
         output.num_omitted, output.text = num_omitted, text.replace("\0", "\N{REPLACEMENT CHARACTER}")
-        self._bus.publish(PROCMAN_OUTPUT, output.encode())
+        self._bus.publish(PROCMAN_OUTPUT, sign(output, self._key))

@@ -26,6 +26,7 @@ class StageReport:
     repaired: int
     lost: int
     undecodable: int
+    strangers: int
     queue: int
     step_ms: float  # median
     cpu_percent: float
@@ -50,6 +51,7 @@ def to_report(message: stage_status_t) -> StageReport:
         repaired=message.num_repaired,
         lost=message.num_lost,
         undecodable=message.num_undecodable,
+        strangers=message.num_strangers,
         queue=message.queue,
         step_ms=message.step_median_ms,
         cpu_percent=message.cpu_percent,

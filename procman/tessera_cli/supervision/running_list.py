@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tessera_cli.constants import STATUS
 from tessera_cli.lcm_bus import Bus
+from tessera_cli.membership import secret_of
 from tessera_cli.messages import stage_status_t
 from tessera_cli.settings import Settings
 
@@ -19,14 +20,20 @@ class RunningList:
     main_url: str
     channel_prefix: str
     bus: Bus
+    keys: frozenset[bytes]  # of the deputies that have processes of the list
 
 
 def listen_to(
-    name: str, run: str, settings: Settings, publisher: str, on_stage: Callable[[str, stage_status_t], None]
+    name: str,
+    run: str,
+    settings: Settings,
+    keys: frozenset[bytes],
+    publisher: str,
+    on_stage: Callable[[str, stage_status_t], None],
 ) -> RunningList:
     """`on_stage` gets the list's name and each status of a running or finished stage of this machine.
 
-    Raises RunError if the bus can't be opened.
+    `keys`: of the deputies of the list. Raises RunError if the bus can't be opened.
     """
 
     def on_status(status: stage_status_t) -> None:
@@ -36,5 +43,5 @@ def listen_to(
 
     main_url, prefix = settings["bus"]["main_url"], settings["bus"]["channel_prefix"]
     bus = Bus(main_url, publisher)
-    bus.subscribe(prefix + STATUS, stage_status_t, on_status)
-    return RunningList(name, run, main_url, prefix, bus)
+    bus.subscribe(prefix + STATUS, stage_status_t, on_status, secret_of(settings))
+    return RunningList(name, run, main_url, prefix, bus, keys)

@@ -11,7 +11,7 @@ from tessera_cli.messages import procman_process_t as states
 from tessera_cli.supervision.orders import draw_order_id
 from tessera_cli.supervision.process_list import Process, ProcessList, ScriptStep
 from tessera_cli.supervision.process_names import full_name, processes_of
-from tessera_cli.supervision.sheriff import Sheriff
+from tessera_cli.supervision.sheriff import Membership, Sheriff
 from tessera_cli.supervision.supervised_process import STATE_NAMES
 
 # States that fulfill a wait. A process that no deputy knows is stopped.
@@ -25,23 +25,33 @@ HOPELESS = {"ready": (states.FAILED, states.ENDED), "finished": (states.FAILED,)
 MAX_DESCRIBED = 5
 
 
+def host_of(process: Process) -> str:
+    """The id of its deputy."""
+    return process.host or os.uname().nodename
+
+
+def hosts_of(process_list: ProcessList) -> list[str]:
+    """The ids of all deputies that the list needs, sorted."""
+    return sorted({host_of(process) for process in process_list.processes.values()})
+
+
 class ScriptRunner:
     """One run of one list. The deputies are told to have what was started so far."""
 
     def __init__(
-        self, sheriff: Sheriff, name: str, process_list: ProcessList, settings: list[str], say: Callable[[str], None]
+        self,
+        sheriff: Sheriff,
+        name: str,
+        process_list: ProcessList,
+        settings: list[str],
+        secret: bytes | None,
+        say: Callable[[str], None],
     ) -> None:
-        """`name`: of the list, as the deputies know it."""
+        """`name`: of the list, as the deputies know it. `secret`: of its members; None: they do without."""
         self._sheriff, self._name, self._list, self._settings, self._say = sheriff, name, process_list, settings, say
+        self._membership = Membership(secret, tuple(hosts_of(process_list))) if secret else None
         self._started: set[str] = set()
         self._session = draw_order_id()
-
-    def host(self, process: Process) -> str:
-        return process.host or os.uname().nodename
-
-    @property
-    def hosts(self) -> list[str]:
-        return sorted({self.host(process) for process in self._list.processes.values()})
 
     def run(self, script: str) -> None:
         """Raises RunError with the process, the reason and the step's place if a wait is in vain."""
@@ -71,20 +81,20 @@ class ScriptRunner:
     def end_on_other_hosts(self) -> None:
         """On nodes that still run an earlier version of the list and are no longer in it."""
         for deputy in self._sheriff.deputies_of(self._name):
-            if deputy not in self.hosts:
+            if deputy not in hosts_of(self._list):
                 self._sheriff.run(deputy, self._name, [], [], self._session)
 
     def _order(self, names: Iterable[str]) -> None:
-        for host in sorted({self.host(self._list.processes[name]) for name in names}):
+        for host in sorted({host_of(self._list.processes[name]) for name in names}):
             started = [process for name, process in self._list.processes.items() if name in self._started]
-            wanted = [process for process in started if self.host(process) == host]
-            self._sheriff.run(host, self._name, wanted, self._settings, self._session)
+            wanted = [process for process in started if host_of(process) == host]
+            self._sheriff.run(host, self._name, wanted, self._settings, self._session, self._membership)
 
     def _restart(self, names: Iterable[str]) -> None:
         for name in names:
             order = procman_order_t()
             order.action, order.process = procman_order_t.RESTART, full_name(self._name, name)
-            self._sheriff.send(self.host(self._list.processes[name]), order)
+            self._sheriff.send(host_of(self._list.processes[name]), order)
 
     def _wait_of(self, step: ScriptStep) -> None:
         try:
@@ -110,11 +120,11 @@ class ScriptRunner:
         return process.state if process else states.STOPPED
 
     def _process(self, name: str) -> states | None:
-        deputy = self._sheriff.deputies.get(self.host(self._list.processes[name]))
+        deputy = self._sheriff.deputies.get(host_of(self._list.processes[name]))
         return processes_of(deputy.status).get(full_name(self._name, name)) if deputy else None
 
     def _describe(self, name: str) -> str:
-        host = self.host(self._list.processes[name])
+        host = host_of(self._list.processes[name])
         deputy = self._sheriff.deputies.get(host)
         if deputy is None or deputy.is_silent:
             return f"{name}: its deputy {host} no longer answers"

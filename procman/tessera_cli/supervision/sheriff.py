@@ -10,7 +10,10 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tessera_cli.cluster.keys import KeyRing, key_folder
+from nacl.public import SealedBox
+from nacl.signing import VerifyKey
+
+from tessera_cli.cluster.keys import KeyRing, key_folder, to_text
 from tessera_cli.constants import (
     DISCOVERY_S,
     DISTRUST_TIMEOUT_S,
@@ -26,9 +29,11 @@ from tessera_cli.constants import (
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.lcm_bus import Bus, is_on_lan, listen, procman_url
 from tessera_cli.messages import procman_order_t, procman_output_t, procman_process_t, procman_status_t
-from tessera_cli.supervision.orders import draw_order_id, sign
+from tessera_cli.supervision.deputy_words import DeputyWords
+from tessera_cli.supervision.orders import draw_order_id
 from tessera_cli.supervision.process_list import Process
 from tessera_cli.supervision.process_names import processes_of, split_name
+from tessera_cli.supervision.signatures import sign
 from tessera_cli.supervision.wishes import to_wish
 
 
@@ -44,6 +49,14 @@ class KnownDeputy:
         return time.monotonic() - self.received_at > SILENT_DEPUTY_S
 
 
+@dataclass(frozen=True)
+class Membership:
+    """What the members of a list share."""
+
+    secret: bytes
+    deputies: tuple[str, ...]  # ids of those that have processes of the list
+
+
 def _num_distrusted(status: procman_status_t) -> int:
     return sum(number for kind, number in zip(status.kinds, status.num_refused) if kind == "unknown key")
 
@@ -53,21 +66,33 @@ class Sheriff:
 
     def __init__(self, arguments: Namespace) -> None:
         """`arguments`: --port and --lan."""
-        self._key = KeyRing(key_folder()).signing_key()
+        self._ring = KeyRing(key_folder())
+        self._key = self._ring.signing_key()
+        trusted = set(self._ring.trusted().values())
+        self._words = DeputyWords(lambda: trusted)
         self._is_on_lan = is_on_lan(arguments)
         self._bus = Bus(procman_url(arguments), f"sheriff_{os.getpid()}")
-        self._bus.subscribe(PROCMAN_STATUS, procman_status_t, self._on_status)
+        self._status_handlers: list[Callable[[procman_status_t], None]] = []
+        self._bus.subscribe(PROCMAN_STATUS, None, self._on_status)
         self._other_buses: list[Bus] = []
         self.deputies: dict[str, KnownDeputy] = {}
 
-    def _on_status(self, status: procman_status_t) -> None:
+    def _on_status(self, data: bytes) -> None:
+        if (status := self._words.accept(procman_status_t, data)) is None:
+            return
         self.deputies[status.deputy] = KnownDeputy(status, time.monotonic())
+        for handler in self._status_handlers:
+            handler(status)
 
     def on_status(self, handler: Callable[[procman_status_t], None]) -> None:
-        self._bus.subscribe(PROCMAN_STATUS, procman_status_t, handler)
+        self._status_handlers.append(handler)
 
     def on_output(self, handler: Callable[[procman_output_t], None]) -> None:
-        self._bus.subscribe(PROCMAN_OUTPUT, procman_output_t, handler)
+        def on_data(data: bytes) -> None:
+            if (output := self._words.accept(procman_output_t, data)) is not None:
+                handler(output)
+
+        self._bus.subscribe(PROCMAN_OUTPUT, None, on_data)
 
     def also_listen_to(self, buses: list[Bus]) -> None:
         """While it listens to deputies; replaces those given before."""
@@ -82,25 +107,46 @@ class Sheriff:
         self.listen(DISCOVERY_S)
         if not self.deputies:
             hint = f"start one on each node: procman/tessera deputy{self._lan_hint()}"
-            raise RunError(f"no deputy answers on {self._bus.url}: {hint}")
+            raise RunError(f"no deputy answers on {self._bus.url}: {self._unknown_hint() or hint}")
 
     def _lan_hint(self) -> str:
         return "" if self._is_on_lan else " (on other machines: --lan there and here)"
+
+    def _unknown_hint(self) -> str:
+        """What to do about deputies that are not believed; empty if there are none."""
+        if not self._words.unknown:
+            return ""
+        name, key = next(iter(self._words.unknown.items()))
+        return (
+            f"{', '.join(self._words.unknown)} answers with a key that this user does not trust; compare it with "
+            f"`procman/tessera keys` there, then: procman/tessera keys trust {name} {to_text(key)}"
+        )
 
     def require_deputies(self, ids: list[str]) -> None:
         """Waits for them. Raises UserError that names those that do not answer."""
         until = time.monotonic() + FIND_DEPUTY_TIMEOUT_S
         while missing := [name for name in ids if name not in self.deputies]:
             if time.monotonic() > until:
+                if any(name in self._words.unknown for name in missing):
+                    raise UserError(f"{self._unknown_hint()}.")
                 raise UserError(
                     f"no deputy answers for {', '.join(missing)}; known: {', '.join(self.deputies) or 'none'}. "
                     f"Start it there: procman/tessera deputy --id {missing[0]}{self._lan_hint()}"
                 )
             self.listen(LISTEN_S)
 
-    def run(self, deputy: str, list_name: str, processes: list[Process], settings: list[str], session: str) -> None:
+    def run(
+        self,
+        deputy: str,
+        list_name: str,
+        processes: list[Process],
+        settings: list[str],
+        session: str,
+        membership: Membership | None = None,
+    ) -> None:
         """The deputy is to run exactly these processes of the list; none: it ends, or all lists if it has no name.
 
+        `membership`: None where messages are neither signed nor checked.
         Raises RunError with the deputy's sentence if it refuses.
         """
         order = procman_order_t()
@@ -108,6 +154,13 @@ class Sheriff:
         order.settings, order.num_settings = settings, len(settings)
         order.wishes = [to_wish(process) for process in processes]
         order.num_wishes = len(order.wishes)
+        if membership:
+            known = self.deputies[deputy].status.key
+            order.secret = SealedBox(VerifyKey(known).to_curve25519_public_key()).encrypt(membership.secret)
+            order.num_secret_bytes = len(order.secret)
+            order.deputies = [name for name in membership.deputies if name in self.deputies]
+            order.deputy_keys = [to_text(self.deputies[name].status.key) for name in order.deputies]
+            order.num_deputies = len(order.deputies)
         self.send(deputy, order)
 
     def send(self, deputy: str, order: procman_order_t) -> str:

@@ -2,10 +2,16 @@
 
 import fcntl
 import os
+import time
 from pathlib import Path
 
 from tessera_cli.errors import UserError
-from tessera_cli.files import replacing
+from tessera_cli.files import replacing, write_text
+from tessera_cli.membership import RunDir
+
+# Of the deputy's earlier lives, those that are remembered; and an epoch has 16 digits until the year 2286.
+MAX_EPOCHS = 1000
+MAX_EPOCH_DIGITS = 18
 
 
 class LogFolder:
@@ -54,6 +60,23 @@ class StateFolder(LogFolder):
         for path in self.path.glob("settings-*.yaml"):
             if path not in kept:
                 path.unlink(missing_ok=True)
+
+    def run_dir(self, list_name: str) -> RunDir:
+        """What the members of a list share on this node."""
+        return RunDir(self.path / "runs" / list_name)
+
+    def begin_epoch(self) -> tuple[int, set[int]]:
+        """The epoch of a deputy that starts, and those of its earlier lives here, which are all smaller.
+
+        It is the time in us since 1970, unless the clock was set back.
+        """
+        path = self.path / "epochs"
+        words = path.read_text().split() if path.exists() else []
+        earlier = {int(word) for word in words if word.isdecimal() and len(word) < MAX_EPOCH_DIGITS}
+        epoch_us = max(int(time.time() * 1e6), max(earlier, default=0) + 1)
+        kept = sorted(earlier)[-MAX_EPOCHS:]
+        write_text(path, "".join(f"{number}\n" for number in [*kept, epoch_us]))
+        return epoch_us, earlier
 
     def keep_order(self, list_name: str, data: bytes) -> None:
         with replacing(self.path / "orders" / list_name) as written:

@@ -14,9 +14,10 @@ from tessera_cli.supervision.process_list import Process
 from tessera_cli.supervision.process_names import full_name
 
 
-def run_of(settings: list[str]) -> str:
-    """A digest of the settings that names a run: deputies of one run wait for each other's processes."""
-    return hashlib.sha256("\n".join(settings).encode()).hexdigest()[:16]
+def run_of(settings: list[str], secret: bytes | None) -> str:
+    """A digest of settings and secret that names a run: deputies of one run wait for each other's processes."""
+    words = [*settings, hashlib.sha256(secret).hexdigest() if secret else ""]
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
 
 
 def to_wish(process: Process) -> procman_wish_t:

@@ -68,7 +68,12 @@ def test_a_node_that_has_all_is_ready() -> None:
         ("build current", "", "it has no build"),
         ("build current", "build current\nlibrary liblcm.so.1", "don't find liblcm.so.1"),
         ("route 000000E0 000000F0", "route 0000A8C0 00FFFFFF", "no route for multicast"),
-        ("trusted me AAAA", "trusted other BBBB", "procman/tessera keys trust me@base AAAA"),
+        (
+            "trusted me AAAA",
+            "trusted other BBBB",
+            "do there, when it is set up: procman/tessera keys trust me@base AAAA",
+        ),
+        ("trusted me AAAA", "trusted me BBBB\ntrusted base AAAA", "do here: procman/tessera keys trust me@board1 BBBB"),
     ],
 )
 def test_each_thing_that_is_missing_is_named(line: str, other: str, words: str) -> None:

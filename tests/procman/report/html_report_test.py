@@ -217,6 +217,7 @@ def test_more_runs_than_colors(tmp_path: Path, number: int) -> None:
         ({"messages_repaired": 1}, "1 message got lost on the network and was"),
         ({"messages_lost": 2}, "2 messages stayed lost"),
         ({"messages_undecodable": 5}, "5 messages could not be decoded"),
+        ({"messages_of_strangers": 37}, "37 messages of strangers were passed over"),
         ({"extractor_restarts": 1}, "restarted 1 time"),
         ({"warnings": ["mapper was killed."]}, "mapper was killed."),
         ({"map_wait_ms": {"mean": 20.0, "p95": 80.0, "median": 1.0}}, "waited for the mapper 20.0 ms"),

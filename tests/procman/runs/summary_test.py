@@ -3,7 +3,7 @@
 import numpy as np
 
 from tessera_cli.runs.run_folder import Frames
-from tessera_cli.runs.summary import scale_warnings
+from tessera_cli.runs.summary import judge_end, scale_warnings
 
 
 def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None = None) -> Frames:
@@ -56,3 +56,12 @@ def test_frames_that_leave_the_scale_open_are_a_stretch_with_its_factor() -> Non
 def test_doubts_of_both_kinds_come_in_the_order_of_their_frames() -> None:
     first, second = scale_warnings(_frames(400, [300], {100: 0.5}), "mono")
     assert "at frame 100 by a factor" in first and "at frame 300: the images contradicted" in second
+
+
+def test_complete_means_that_every_frame_is_accounted_for() -> None:
+    assert judge_end("complete", {"frames": 60, "frames_missing": 0}) == "complete"
+    assert judge_end("complete", {"frames": 59, "frames_missing": 1}) == (
+        "incomplete: 1 frame is not accounted for, of 60 that the camera sent"
+    )
+    assert "40 frames are not" in judge_end("complete", {"frames": 20, "frames_missing": 40})
+    assert judge_end("interrupted", {"frames": 20, "frames_missing": 40}) == "interrupted"

@@ -5,6 +5,7 @@ import random
 import signal
 import socket
 import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -18,8 +19,10 @@ from helpers.stack import environment, read_line, wait_for
 from tessera_cli.cluster.keys import KeyRing, to_text
 from tessera_cli.lcm_bus import bus_url
 from tessera_cli.messages import procman_order_t, procman_status_t
-from tessera_cli.supervision.orders import OrderVerifier, sign
+from tessera_cli.supervision.orders import OrderVerifier
+from tessera_cli.supervision.signatures import sign
 
+KEYS = (sys.executable, "-m", "tessera_cli", "keys")
 COMMANDS = """
 cmd "sleeper"   { exec = "sleep 1000"; }
 cmd "family"    { exec = "sh -c 'setsid sleep 1001 & trap \\"\\" TERM; sleep 1002; wait'"; }
@@ -239,6 +242,10 @@ def test_who_is_not_trusted_is_not_obeyed_and_told_why(
 ) -> None:
     node = make_node(COMMANDS).start()
     monkeypatch.setenv("TESSERA_KEYS", str(tmp_path / "a stranger"))
+    up = node.up(listed("sleeper"))
+    assert up.returncode == 2 and "does not trust" in up.stderr and "keys trust node1 " in up.stderr
+    trust = up.stderr.partition("tessera keys trust ")[2].rstrip(".\n").split()
+    assert subprocess.run([*KEYS, "trust", *trust], env=environment()).returncode == 0
     up = node.up(listed("sleeper"))
     assert up.returncode == 1 and "unknown key" in up.stderr
     assert node.processes() == {} and node.status()["orders_obeyed"] == 0

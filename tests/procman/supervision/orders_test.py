@@ -3,7 +3,7 @@
 import random
 
 from helpers.orders import KEY, bad_order, make_order, make_verifier
-from tessera_cli.supervision.orders import SIGNATURE_BYTES, sign
+from tessera_cli.supervision.signatures import SIGNATURE_BYTES, sign
 
 
 def test_a_signed_fresh_order_passes_with_its_content() -> None:

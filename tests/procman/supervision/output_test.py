@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from helpers.nodes import MakeNode
+from helpers.orders import KEY
 from tessera_cli.constants import MAX_OUTPUT_BYTES, TAIL_PIECE_BYTES
 from tessera_cli.lcm_bus import Bus
 from tessera_cli.messages import header_t, procman_output_t
@@ -43,7 +44,7 @@ def test_a_log_goes_on_where_an_earlier_deputy_ended(tmp_path: Path) -> None:
 
 def test_lines_are_forwarded_whole() -> None:
     bus = RecordingBus()
-    forwarder = OutputForwarder(bus, "node1")
+    forwarder = OutputForwarder(bus, "node1", KEY)
     forwarder.add("a", b"one\ntw")
     forwarder.flush(1.0)
     forwarder.add("a", b"o\n")
@@ -53,7 +54,7 @@ def test_lines_are_forwarded_whole() -> None:
 
 def test_a_chatterbox_is_cut_short_and_what_is_left_out_is_counted() -> None:
     bus = RecordingBus()
-    forwarder = OutputForwarder(bus, "node1")
+    forwarder = OutputForwarder(bus, "node1", KEY)
     forwarder.add("a", b"x" * 99 + b"\n" + (b"y" * 99 + b"\n") * 100)
     forwarder.flush(1.0)
     (output,) = bus.sent
@@ -63,7 +64,7 @@ def test_a_chatterbox_is_cut_short_and_what_is_left_out_is_counted() -> None:
 def test_a_tail_comes_in_pieces_with_an_end() -> None:
     bus = RecordingBus()
     text = "".join(f"{number}\n" for number in range(1000))
-    OutputForwarder(bus, "node1").send_tail("a", "order", text)
+    OutputForwarder(bus, "node1", KEY).send_tail("a", "order", text)
     assert all(len(output.text) <= TAIL_PIECE_BYTES and output.order == "order" for output in bus.sent)
     assert "".join(output.text for output in bus.sent) == text and bus.sent[-1].text == ""
 

@@ -82,7 +82,7 @@ def pid_of(deputy: PrivateDeputy, name: str) -> int:
 
 def report(deputy: PrivateDeputy, name: str, state: int) -> StageReport:
     return StageReport(
-        name, "host", pid_of(deputy, name), 0, state, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, "", {}, time.monotonic()
+        name, "host", pid_of(deputy, name), 0, state, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, "", {}, time.monotonic()
     )
 
 

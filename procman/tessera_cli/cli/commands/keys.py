@@ -15,7 +15,7 @@ def add_parser(commands: Commands) -> None:
         commands,
         "keys",
         main,
-        "Whose orders the deputies of this user obey; lists them.",
+        "Whose orders the deputies of this user obey, and whose deputies it believes; lists them.",
         "examples:\n  procman/tessera keys\n  procman/tessera keys trust base 3q2+7w...=\n",
     )
     actions = parser.add_subparsers(metavar="list|make|trust|revoke", dest="action", parser_class=Parser)
