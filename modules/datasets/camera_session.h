@@ -2,7 +2,7 @@
 // when. Poses in, actions out. No bus, and the time is told.
 //
 //   kMustRead  Advance() reads the next frame ahead, so that decoding it delays nobody
-//   kWaits     the frame that was read may not go yet (pacer.h)
+//   kWaits     the frame that was read may not go yet (pacer.h), or a live source has none
 //   kReady     Advance() sends it, behind the true poses up to it
 //   kAtEnd     the source has no more frames: Advance() ends the stream
 //   kEnded     the stream has ended, or broke off at a damaged image and gets no end
@@ -43,6 +43,7 @@ class CameraSession {
   CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us);
 
   const FrameSource& source() const { return *source_; }
+  std::vector<std::string> TakeEvents() { return source_->TakeEvents(); }
   // This frame, taken at `utime_us`, and all before it, have a pose.
   void MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
   // The state now; passes over what is tracked.
