@@ -138,7 +138,8 @@ CameraRig LoadCalibrationFile(const std::string& path) {
   }
   const Section section(path, "", document,
                         {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion", "depth_unit_m",
-                         "baseline_m", "right"});
+                         "baseline_m", "right", "base_from_camera"});
+  if (section.Has("base_from_camera")) ReadRigid(section, "base_from_camera");  // used by whoever tells poses
   CameraRig rig;
   rig.left = ReadPinhole(section);
   if (section.Has("width_px") || section.Has("height_px")) {

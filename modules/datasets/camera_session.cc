@@ -42,7 +42,8 @@ Result<> CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now
 CameraSession::State CameraSession::Look(int64_t now_us) {
   if (has_ended_) return State::kEnded;
   if (next_ && next_->id <= tracked_) PassOverTracked();
-  if (!next_) return is_exhausted_ ? State::kAtEnd : State::kMustRead;
+  if (!next_ && is_exhausted_) return State::kAtEnd;
+  if (!next_) return source_->HasNext() ? State::kMustRead : State::kWaits;
   return pacer_.MayGo(next_->utime_us, now_us) ? State::kReady : State::kWaits;
 }
 
@@ -89,6 +90,7 @@ CameraActions CameraSession::Read() {
 CameraActions CameraSession::Send(int64_t now_us) {
   last_sent_ = next_->id;
   if (!first_sent_.valid()) first_sent_ = last_sent_;
+  next_->age_us += pacer_.LatenessUs(next_->utime_us, now_us);
   pacer_.MarkSent(last_sent_);
   last_progress_us_ = now_us;
   ++num_sent_;

@@ -2,7 +2,7 @@
 // when. Poses in, actions out. No bus, and the time is told.
 //
 //   kMustRead  Advance() reads the next frame ahead, so that decoding it delays nobody
-//   kWaits     the frame that was read may not go yet (pacer.h)
+//   kWaits     the frame that was read may not go yet (pacer.h), or a live source has none
 //   kReady     Advance() sends it, behind the true poses up to it
 //   kAtEnd     the source has no more frames: Advance() ends the stream
 //   kEnded     the stream has ended, or broke off at a damaged image and gets no end
@@ -46,6 +46,7 @@ class CameraSession {
   const FrameSource& source() const { return *source_; }
   // This frame, taken at `utime_us`, and all before it, have a pose. Fails if it can't have been sent.
   Result<> MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
+  std::vector<std::string> TakeEvents() { return source_->TakeEvents(); }
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
   // Takes the step of the state that Look() just told; none where the camera waits or has ended.

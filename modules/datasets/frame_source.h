@@ -36,10 +36,15 @@ class FrameSource {
   virtual const std::vector<GroundTruthPose>& ground_truth() const = 0;
   // The next frame; nullopt at the end. Throws InputError at an image that is damaged or of another size.
   virtual std::optional<CameraFrame> Next() = 0;
+  // Whether Next() has something to return, rather than to wait for.
+  virtual bool HasNext() { return true; }
   // Frames below this number are no longer needed. A source that has to read them anyway returns them nonetheless.
   virtual void SkipTo(FrameId /*frame*/) {}
-  // Whether frames come at their own pace and can't be delayed.
+  // Whether frames come at their own pace and can't be delayed. Its times are those of its own clock, 0 where it has
+  // none, and it ends where the connection does.
   virtual bool is_live() const = 0;
+  // What happened to the connection since the last call, one sentence each.
+  virtual std::vector<std::string> TakeEvents() { return {}; }
   // Notes for the user about how the source was read, one sentence each; more may come with each frame.
   virtual const std::vector<std::string>& notes() const = 0;
 };

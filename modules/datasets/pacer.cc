@@ -1,5 +1,6 @@
 #include "datasets/pacer.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -40,6 +41,12 @@ bool Pacer::MayGo(int64_t utime_us, int64_t now_us) {
   // due - start = (utime - first utime) / speed
   return static_cast<double>(now_us - start_->now_us) * options_.speed >=
          static_cast<double>(utime_us - start_->utime_us);
+}
+
+int64_t Pacer::LatenessUs(int64_t utime_us, int64_t now_us) const {
+  if (options_.kind != PacerOptions::Kind::kTimed || !start_) return 0;
+  const double due_us = static_cast<double>(utime_us - start_->utime_us) / options_.speed;
+  return std::max<int64_t>(0, now_us - start_->now_us - std::llround(due_us));
 }
 
 void Pacer::MarkSent(FrameId frame) {

@@ -1,6 +1,7 @@
 // Frame numbers and times of a live source that was reopened during a run: it counts from 0, the run continues.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "geometry/camera_frame.h"
@@ -22,7 +23,7 @@ class Renumbering {
   void MoveBehind(FrameId tracked, int64_t tracked_utime_us, CameraFrame& frame) {
     if (frame.id > tracked) return;
     const int64_t number_step = tracked.value + num_on_the_way_ + 1 - frame.id.value;
-    const int64_t time_step_us = tracked_utime_us + kMissedUs - frame.utime_us;
+    const int64_t time_step_us = std::max<int64_t>(0, tracked_utime_us + kMissedUs - frame.utime_us);
     frame.id.value += number_step;
     frame.utime_us += time_step_us;
     number_offset_ += number_step;
@@ -30,7 +31,7 @@ class Renumbering {
   }
 
  private:
-  // Longer than frames on their way and a restart take; the restarted clock does not know the true time.
+  // Longer than frames on their way and a restart take, where the source's clock began anew.
   static constexpr int64_t kMissedUs = 3'000'000;
 
   const int64_t num_on_the_way_;

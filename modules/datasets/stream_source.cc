@@ -31,7 +31,7 @@ class StreamSource : public FrameSource {
  private:
   void ChooseFrames(const SourceOptions& options);
   void NoteEarlyEnd();
-  int64_t TimeOfLastImage(int64_t index);
+  int64_t TimeOfLastImage();
 
   std::string name_;
   VideoInput video_;
@@ -49,9 +49,10 @@ class StreamSource : public FrameSource {
 
 StreamSource::StreamSource(VideoInput video, CameraRig rig, const SourceOptions& options, bool is_live)
     : name_(options.source), video_(std::move(video)), is_live_(is_live), frames_per_s_(video_.frames_per_s()) {
-  if (frames_per_s_ == 0.0) {
+  if (frames_per_s_ == 0.0 && !is_live_) {
     frames_per_s_ = kAssumedFramesPerS;
-    notes_.push_back("Warning: " + name_ + " does not tell its frame rate; 30 frames per second are assumed.");
+    notes_.push_back("Warning: " + name_ +
+                     " does not tell its frame rate; where its images have no times, 30 a second are assumed.");
   }
   ChooseFrames(options);
   first_image_ = video_.Read();
@@ -96,18 +97,14 @@ std::optional<int64_t> StreamSource::num_frames() const {
   return end_ < 0 ? std::nullopt : std::optional(end_ - first_);
 }
 
-// A file's images are evenly spaced; a live stream has its own clock, unless that stands still.
-int64_t StreamSource::TimeOfLastImage(int64_t index) {
-  const auto period_us = 1e6 / frames_per_s_;
-  int64_t utime_us = std::llround(static_cast<double>(index) * period_us);
-  if (is_live_) {
-    utime_us = std::llround(video_.position_ms() * 1e3);
-    if (utime_us <= last_utime_us_) {
-      utime_us = last_utime_us_ + std::llround(period_us);
-    }
-  }
-  last_utime_us_ = utime_us;
-  return utime_us;
+// A file's images have times of their own, also where their rate varies (phones); where they don't, they are evenly
+// spaced.
+int64_t StreamSource::TimeOfLastImage() {
+  const int64_t stamp_us = std::llround(video_.position_ms() * 1e3);
+  if (is_live_) return stamp_us;
+  const bool goes_on = stamp_us > last_utime_us_ || (stamp_us == 0 && last_utime_us_ < 0);
+  last_utime_us_ = goes_on ? stamp_us : last_utime_us_ + std::llround(1e6 / frames_per_s_);
+  return last_utime_us_;
 }
 
 std::optional<CameraFrame> StreamSource::Next() {
@@ -127,7 +124,7 @@ std::optional<CameraFrame> StreamSource::Next() {
               "frame " + std::to_string(next_) + " of " + name_);
   CameraFrame frame;
   frame.id = FrameId{next_};
-  frame.utime_us = TimeOfLastImage(next_);
+  frame.utime_us = TimeOfLastImage();
   frame.left = rectifier_->Left(std::move(*image));
   ++next_;
   return frame;

@@ -4,10 +4,14 @@
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <vector>
 
 #include "core/errors.h"
 
 namespace tessera {
+
+// Of a network stream: one that stalls for less is waited for, which is quicker than to connect anew.
+constexpr int kReadTimeoutMs = 10'000, kOpenTimeoutMs = 10'000;
 
 struct VideoInput::Impl {
   cv::VideoCapture capture;
@@ -46,7 +50,9 @@ VideoInput VideoInput::OpenDevice(int index, int width_px, int height_px) {
 
 VideoInput VideoInput::OpenUrl(const std::string& url) {
   auto impl = std::make_unique<Impl>();
-  if (!impl->capture.open(url)) {
+  const std::vector<int> time_outs{cv::CAP_PROP_OPEN_TIMEOUT_MSEC, kOpenTimeoutMs, cv::CAP_PROP_READ_TIMEOUT_MSEC,
+                                   kReadTimeoutMs};
+  if (!impl->capture.open(url, cv::CAP_FFMPEG, time_outs)) {
     throw InputError("stream " + url + " can't be opened: check the address and that the camera answers");
   }
   return VideoInput(std::move(impl));

@@ -14,8 +14,7 @@ std::string SizeText(int width_px, int height_px) { return std::to_string(width_
 void DispatcherSession::Receive(const CameraCalibration& calibration) {
   if (calibration_) {
     if (*calibration_ != calibration) {
-      reports_.push_back(
-          "the calibration changed within a stream; the new one is ignored: restart the stack for another camera");
+      Report("the calibration changed within a stream; the new one is ignored: restart the stack for another camera");
     }
     return;
   }
@@ -24,14 +23,36 @@ void DispatcherSession::Receive(const CameraCalibration& calibration) {
   before_calibration_.clear();
 }
 
-void DispatcherSession::Receive(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us) {
+// A program that was started again counts from 0 again: it is continued behind what came before, by the time that has
+// passed here.
+CameraFrame DispatcherSession::Continued(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us) {
+  CameraFrame continued = frame;
+  if (!options_.renumbers) return continued;
+  const bool is_other = newest_.valid() && arrival.camera_epoch_us != last_camera_epoch_us_;
+  last_camera_epoch_us_ = arrival.camera_epoch_us;
+  if (is_other && frame.id.value + number_offset_ <= newest_.value) {
+    number_offset_ = newest_.value + 1 - frame.id.value;
+    first_camera_epoch_us_ = arrival.camera_epoch_us;
+    Report("the program that sends the frames was started again; the run continues with its frames");
+  }
+  if (is_other && frame.utime_us + time_offset_us_ <= newest_utime_us_) {
+    time_offset_us_ = newest_utime_us_ + std::max<int64_t>(1, now_us - last_frame_us_) - frame.utime_us;
+  }
+  continued.id.value += number_offset_;
+  continued.utime_us += time_offset_us_;
+  return continued;
+}
+
+void DispatcherSession::Receive(const CameraFrame& sent, const FrameArrival& arrival, int64_t now_us) {
+  const CameraFrame frame = Continued(sent, arrival, now_us);
+  if (Watches()) ReportIfAny(source_watch_.NoteFrame(now_us));
   last_frame_us_ = now_us;
   if (!first_camera_epoch_us_) first_camera_epoch_us_ = arrival.camera_epoch_us;
   if (frame.id <= newest_) {
     // A camera that was started again repeats what is not tracked yet.
     if (arrival.camera_epoch_us == *first_camera_epoch_us_) {
-      reports_.push_back("frame " + std::to_string(frame.id.value) + " came after frame " +
-                         std::to_string(newest_.value) + " and is ignored: is there a second camera?");
+      Report("frame " + std::to_string(frame.id.value) + " came after frame " + std::to_string(newest_.value) +
+             " and is ignored: is there a second camera?");
     }
     return;
   }
@@ -42,7 +63,12 @@ void DispatcherSession::Receive(const CameraFrame& frame, const FrameArrival& ar
   }
   NoteGapBefore(frame.id);
   newest_ = frame.id;
-  Arrived arrived{frame, arrival.arrival_us, arrival.publish_us < options_.epoch_us};
+  newest_utime_us_ = frame.utime_us;
+  overload_.NoteArrival(now_us);
+  const bool is_late = arrival.publish_us < options_.epoch_us;
+  if (is_late) newest_late_ = frame.id;
+  // A log player repeats the wall clock of its recording.
+  Arrived arrived{frame, is_late ? arrival.arrival_us : arrival.publish_us - frame.age_us, is_late};
   if (calibration_) {
     Queue(std::move(arrived));
   } else {
@@ -76,18 +102,26 @@ void DispatcherSession::Queue(Arrived arrived) {
   }
   if (!IsAsCalibrated(arrived.frame)) {
     ++num_dropped_;
-    reports_.push_back("frame " + std::to_string(id.value) + " is " +
-                       SizeText(arrived.frame.left.width, arrived.frame.left.height) +
-                       " px, but the calibration says " + SizeText(calibration_->width_px, calibration_->height_px) +
-                       ": the frame is dropped");
+    Report("frame " + std::to_string(id.value) + " is " +
+           SizeText(arrived.frame.left.width, arrived.frame.left.height) + " px, but the calibration says " +
+           SizeText(calibration_->width_px, calibration_->height_px) + ": the frame is dropped");
     return;
   }
+  if (options_.newest_wins) MakeRoomForNewest();
   const bool must_keep = MustKeep(arrived, queue_.num_waiting());
-  if (!queue_.AddFrame(std::move(arrived.frame), *calibration_, arrived.arrival_us, must_keep)) {
+  if (!queue_.AddFrame(std::move(arrived.frame), *calibration_, arrived.captured_us, must_keep)) {
     ++num_dropped_;
-    reports_.push_back("the pipeline is slower than the source: frame " + std::to_string(id.value) +
-                       " is dropped (more extractors, fewer features or a slower pace help)");
+    Report("the pipeline is slower than the source: frame " + std::to_string(id.value) +
+           " is dropped (more extractors, fewer features or a slower pace help)");
   }
+}
+
+void DispatcherSession::MakeRoomForNewest() {
+  const std::optional<FrameId> dropped = queue_.DropNewestWaiting();
+  if (!dropped) return;
+  ++num_dropped_;
+  overload_.NoteDrop();
+  if (*dropped <= newest_late_) late_dropped_.insert(*dropped);
 }
 
 // A log player, too, sends what is old.
@@ -121,6 +155,9 @@ Result<> DispatcherSession::MarkTracked(FrameId frame) {
   // Where camera and dispatcher were started again, the camera may be the first to know what is tracked, and leave it
   // out.
   if (frame > tracked_ && frame >= gap_begin_ && frame < gap_end_) --num_dropped_;
+  // One that the dispatcher before this one gave out. Poses come in order: those before it get none any more.
+  if (late_dropped_.contains(frame)) --num_dropped_;
+  late_dropped_.erase(late_dropped_.begin(), late_dropped_.upper_bound(frame));
   tracked_ = std::max(tracked_, frame);
   queue_.MarkTracked(frame);
   return {};
@@ -133,28 +170,31 @@ void DispatcherSession::Receive(const EndOfStream& camera_end, int64_t now_us) {
 }
 
 void DispatcherSession::Watch(int64_t now_us) {
+  ReportIfAny(overload_.Look(now_us));
+  if (Watches()) ReportIfAny(source_watch_.Look(now_us));
   queue_.CheckExtractors(now_us);
   const bool was_stuck = is_stuck_;
   is_stuck_ = queue_.num_extractors() == 0 && !queue_.idle();
   if (is_stuck_ && !was_stuck) {
-    reports_.push_back("no extractor answers and frames are waiting: start one (tessera-extractor --id 0)");
+    Report("no extractor answers and frames are waiting: start one (tessera-extractor --id 0)");
   }
   const bool is_unheard = !reassembler_epoch_us_ && !queue_.idle();
   num_unheard_ = is_unheard ? num_unheard_ + 1 : 0;
   if (num_unheard_ == kPatience) {
-    reports_.push_back("frames are waiting for the reassembler to say that it is there: start tessera-reassembler");
+    Report("frames are waiting for the reassembler to say that it is there: start tessera-reassembler");
   }
 }
 
 std::optional<EndOfStream> DispatcherSession::End(int64_t now_us) {
-  if (has_ended_ || !camera_end_ || !queue_.idle()) return std::nullopt;
-  const int64_t num_missing = std::max<int64_t>(0, camera_end_->num_frames - (newest_.value + 1));
+  if (has_ended_ || !(camera_end_ || has_given_up()) || !queue_.idle()) return std::nullopt;
+  const EndOfStream camera_end = camera_end_.value_or(EndOfStream{.num_frames = newest_.value + 1});
+  const int64_t num_missing = std::max<int64_t>(0, camera_end.num_frames + number_offset_ - (newest_.value + 1));
   if (num_missing > 0 && now_us - last_frame_us_ < kLastFrameTimeoutUs) return std::nullopt;
   has_ended_ = true;
   num_dropped_ += num_missing;
   return EndOfStream{.stage = StageKind::kDispatcher,
                      .num_frames = queue_.last_frame().value + 1,
-                     .num_dropped = camera_end_->num_dropped + num_dropped_};
+                     .num_dropped = camera_end.num_dropped + num_dropped_};
 }
 
 }  // namespace tessera

@@ -8,15 +8,20 @@
 //   a frame of another size or sensor than the calibration says is dropped
 //   a frame that finds the queue full is dropped, unless it was sent before this dispatcher was started: what the
 //   camera keeps is all heard at once, before it is known how far the tracker is
+//   live, the newest frame wins: one frame waits at most, and a newer one takes its place
+//   a program that is started again and counts from 0 again is continued, in numbers and in time, where that is wanted
 #pragma once
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/result.h"
+#include "distribution/overload.h"
+#include "distribution/source_watch.h"
 #include "distribution/work_queue.h"
 #include "geometry/camera_frame.h"
 #include "messages/end_of_stream.h"
@@ -28,6 +33,9 @@ struct DispatcherOptions {
   WorkQueueOptions queue;
   int64_t epoch_us = 0;                 // when this dispatcher was started, wall clock
   int64_t max_kept_bytes = 67'108'864;  // of frames sent before that: what a camera's history holds
+  bool newest_wins = false;             // live: a pose that comes late is worth less than the next one
+  int64_t give_up_us = 0;               // live: as SourceWatch has it
+  bool renumbers = false;               // the source may begin again at frame 0 (bus:)
 };
 
 // How a frame came.
@@ -39,7 +47,8 @@ struct FrameArrival {
 
 class DispatcherSession {
  public:
-  explicit DispatcherSession(const DispatcherOptions& options) : options_(options), queue_(options.queue) {}
+  explicit DispatcherSession(const DispatcherOptions& options)
+      : options_(options), queue_(options.queue), source_watch_(options.give_up_us) {}
 
   void Receive(const CameraCalibration& calibration);
   void Receive(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us);
@@ -64,6 +73,9 @@ class DispatcherSession {
   std::vector<std::string> TakeReports() { return std::exchange(reports_, {}); }
 
   int64_t num_dropped() const { return num_dropped_; }
+  // Live: how long the source has sent nothing, 0 if it sends; and whether the run ends because of that.
+  int64_t SilenceUs(int64_t now_us) const { return Watches() ? source_watch_.SilenceUs(now_us) : 0; }
+  bool has_given_up() const { return source_watch_.has_given_up(); }
   const WorkQueue& queue() const { return queue_; }
 
   // Frames that may overtake their calibration.
@@ -76,12 +88,19 @@ class DispatcherSession {
  private:
   struct Arrived {
     CameraFrame frame;
-    int64_t arrival_us = 0;
+    int64_t captured_us = 0;
     bool is_late = false;  // sent before this dispatcher was started
   };
+  bool Watches() const { return options_.newest_wins && !camera_end_; }
+  void Report(const std::string& sentence) { reports_.push_back(sentence); }
+  void ReportIfAny(const std::optional<std::string>& sentence) {
+    if (sentence) Report(*sentence);
+  }
+  CameraFrame Continued(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us);
   void NoteGapBefore(FrameId frame);
   void HoldUntilCalibrated(Arrived arrived);
   void Queue(Arrived arrived);
+  void MakeRoomForNewest();
   bool MustKeep(const Arrived& arrived, int64_t num_waiting) const;
   bool IsAsCalibrated(const CameraFrame& frame) const;
 
@@ -96,9 +115,17 @@ class DispatcherSession {
   std::optional<int64_t> reassembler_epoch_us_;   // of the last one heard
   FrameId gap_begin_, gap_end_;                   // the frames of the last gap: gap_begin_ .. gap_end_ - 1 did not come
   int64_t num_dropped_ = 0;
-  int64_t last_frame_us_ = 0;  // when the last frame, or the end, came
-  int num_unheard_ = 0;        // looks in a row at frames that wait for the reassembler
-  bool is_stuck_ = false;      // frames wait, and no extractor is there
+  Overload overload_;
+  FrameId newest_late_;  // the last frame that was sent before this dispatcher was started
+  SourceWatch source_watch_;
+  int64_t number_offset_ = 0;   // of the source that is continued
+  int64_t time_offset_us_ = 0;  // likewise
+  int64_t last_camera_epoch_us_ = 0;
+  int64_t newest_utime_us_ = 0;     // of newest_
+  std::set<FrameId> late_dropped_;  // of those that were, the ones that a newer one replaced
+  int64_t last_frame_us_ = 0;       // when the last frame, or the end, came
+  int num_unheard_ = 0;             // looks in a row at frames that wait for the reassembler
+  bool is_stuck_ = false;           // frames wait, and no extractor is there
   bool has_ended_ = false;
   std::vector<std::string> reports_;
 };

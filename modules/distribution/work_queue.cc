@@ -25,14 +25,22 @@ Result<> WorkQueueOptions::Check() const {
 
 WorkQueue::WorkQueue(const WorkQueueOptions& options) : options_(options) {}
 
-bool WorkQueue::AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us, bool must_keep) {
+bool WorkQueue::AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t captured_us, bool must_keep) {
   if (!must_keep && num_waiting() >= options_.max_queued_frames) {
     return false;
   }
   const FrameId id = frame.id;
-  waiting_.push_back({std::move(frame), calibration, arrival_us, last_frame_});
+  waiting_.push_back({std::move(frame), calibration, captured_us, last_frame_});
   last_frame_ = id;
   return true;
+}
+
+std::optional<FrameId> WorkQueue::DropNewestWaiting() {
+  if (waiting_.empty()) return std::nullopt;
+  const FrameId dropped = waiting_.back().frame.id;
+  last_frame_ = waiting_.back().previous_frame;
+  waiting_.pop_back();
+  return dropped;
 }
 
 void WorkQueue::HearExtractor(int extractor, int64_t epoch_us, int64_t now_us, int32_t num_robots) {
@@ -133,7 +141,7 @@ void WorkQueue::CheckExtractors(int64_t now_us) {
 void WorkQueue::CutNextFrame() {
   Waiting next = std::move(waiting_.front());
   waiting_.pop_front();
-  std::vector<TileJob> jobs = CutFrame(next.frame, next.calibration, next.arrival_us, options_.grid,
+  std::vector<TileJob> jobs = CutFrame(next.frame, next.calibration, next.captured_us, options_.grid,
                                        options_.coarse_levels_from, options_.features);
   std::stable_sort(jobs.begin(), jobs.end(),
                    [](const TileJob& a, const TileJob& b) { return NumPixels(a) > NumPixels(b); });

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -40,7 +41,9 @@ class WorkQueue {
 
   // A frame has come; frames must come in order. False: the queue was full and the frame is dropped, unless it must be
   // kept.
-  bool AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t arrival_us, bool must_keep = false);
+  bool AddFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t captured_us, bool must_keep = false);
+  // The last frame that waits is not wanted any more; nullopt: none waits.
+  std::optional<FrameId> DropNewestWaiting();
   // A frame has come that was tracked before this queue was made.
   void SkipFrame(FrameId frame) { last_frame_ = frame; }
   // Jobs that are given from now on are of this run.
@@ -88,7 +91,7 @@ class WorkQueue {
   struct Waiting {
     CameraFrame frame;
     CameraCalibration calibration;
-    int64_t arrival_us = 0;
+    int64_t captured_us = 0;
     FrameId previous_frame;
   };
   struct Worker {

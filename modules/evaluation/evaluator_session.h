@@ -37,6 +37,7 @@ class EvaluatorSession {
   bool MustWrite(int64_t now_us) { return !is_written_ && end_.IsReached(now_us); }
   // Whether there is something to write if nothing more comes: a run that never began leaves no files.
   bool MayWrite() const { return !is_written_ && (!record_.empty() || end_.has_tracker_ended()); }
+  const Map& map() const { return record_.map(); }
   // The record, to be written now; also where that fails, it is not tried again.
   const RunRecord& TakeRecord();
 

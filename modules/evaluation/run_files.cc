@@ -9,6 +9,7 @@
 #include "core/files.h"
 #include "evaluation/map_text.h"
 #include "evaluation/pose_text.h"
+#include "geometry/body_state.h"
 
 namespace tessera {
 namespace {
@@ -16,10 +17,10 @@ namespace {
 // Keys keep the order in which they are written here.
 using Json = nlohmann::ordered_json;
 
-std::string TumText(const std::vector<StampedPose>& poses) {
+std::string TumText(const std::vector<StampedPose>& poses, const Rigid3& base_from_camera) {
   std::string text = "# timestamp tx ty tz qx qy qz qw\n";
   for (const StampedPose& pose : poses) {
-    text += TumRow(pose.utime_us, pose.world_from_camera);
+    text += TumRow(pose.utime_us, PoseOfBase(pose.world_from_camera, base_from_camera));
   }
   return text;
 }
@@ -41,10 +42,10 @@ std::string PartsText(const std::vector<PartRecord>& parts) {
   return text;
 }
 
-std::string KittiText(const std::vector<Rigid3>& poses) {
+std::string KittiText(const std::vector<Rigid3>& poses, const Rigid3& base_from_camera) {
   std::string text;
   for (const Rigid3& pose : poses) {
-    text += KittiRow(pose);
+    text += KittiRow(PoseOfBase(pose, base_from_camera));
   }
   return text;
 }
@@ -193,14 +194,15 @@ void MakeRunFolder(const std::string& folder) {
   }
 }
 
-void WriteRun(const RunRecord& record, const std::string& folder) {
+void WriteRun(const RunRecord& record, const std::string& folder, const Rigid3& base_from_camera) {
+  const auto tum = [&](const std::vector<StampedPose>& poses) { return TumText(poses, base_from_camera); };
   MakeRunFolder(folder);
-  WriteFile(folder + "/trajectory.txt", PartsText(record.Parts()) + TumText(record.Trajectory()));
-  WriteFile(folder + "/trajectory_live.txt", TumText(record.LiveTrajectory()));
-  WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame()));
-  WriteFile(folder + "/keyframes.txt", TumText(record.Keyframes()));
-  WriteFile(folder + "/map.ply", PlyText(record.map()));
-  WriteFile(folder + "/ground_truth.txt", TumText(record.GroundTruth()));
+  WriteFile(folder + "/trajectory.txt", PartsText(record.Parts()) + tum(record.Trajectory()));
+  WriteFile(folder + "/trajectory_live.txt", tum(record.LiveTrajectory()));
+  WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame(), base_from_camera));
+  WriteFile(folder + "/keyframes.txt", tum(record.Keyframes()));
+  WriteFile(folder + "/map.ply", PlyText(record.map(), base_from_camera));
+  WriteFile(folder + "/ground_truth.txt", tum(record.GroundTruth()));
   WriteFile(folder + "/frames.csv", FramesCsv(record));
   WriteFile(folder + "/loops.csv", LoopsCsv(record));
   WriteFile(folder + "/run.json", RunJson(record));  // last: when it exists, so do the others

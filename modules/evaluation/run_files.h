@@ -22,8 +22,9 @@ std::string RunJson(const RunRecord& record);
 void MakeRunFolder(const std::string& folder);
 
 // Writes trajectory.txt, trajectory_live.txt, trajectory_kitti.txt, keyframes.txt, map.ply, ground_truth.txt,
-// frames.csv, loops.csv and, at the very end, run.json into the folder, which is made if need be. Throws InputError if
-// one can't be written.
-void WriteRun(const RunRecord& record, const std::string& folder);
+// frames.csv, loops.csv and, at the very end, run.json into the folder, which is made if need be. Poses, true ones too,
+// are those of the base (geometry/body_state.h), landmarks lie in its world; the hashes in run.json are of the camera's
+// poses and the map, and stay the same. Throws InputError if one can't be written.
+void WriteRun(const RunRecord& record, const std::string& folder, const Rigid3& base_from_camera = Rigid3::Identity());
 
 }  // namespace tessera

@@ -51,8 +51,8 @@ std::vector<FrameRecord> RunRecord::Frames() const {
     if (!frames.empty()) {
       frame.pose_time_ms = 1e-3 * static_cast<double>(pose.publish_us - frames.back().publish_us);
     }
-    if (pose.estimate.arrival_us > 0) {
-      frame.latency_ms = 1e-3 * static_cast<double>(pose.publish_us - pose.estimate.arrival_us);
+    if (pose.estimate.captured_us > 0) {
+      frame.latency_ms = 1e-3 * static_cast<double>(pose.publish_us - pose.estimate.captured_us);
     }
     frames.push_back(frame);
   }

@@ -30,7 +30,7 @@ struct FrameRecord {
   PoseEstimate pose;
   int64_t publish_us = 0;              // wall clock at which the pose was published
   std::optional<double> pose_time_ms;  // since the pose before it was published; none for the first
-  std::optional<double> latency_ms;    // since the dispatcher received the frame; none if unknown
+  std::optional<double> latency_ms;    // since the frame was taken; none if unknown
   std::optional<double> map_wait_ms;   // time it waited in the tracker for map deltas
 };
 

@@ -37,7 +37,7 @@ TileFeatures Extractor::Extract(const TileJob& job) {
                         .frame = job.frame,
                         .previous_frame = job.previous_frame,
                         .utime_us = job.utime_us,
-                        .arrival_us = job.arrival_us,
+                        .captured_us = job.captured_us,
                         .tile = job.tile,
                         .num_tiles = job.num_tiles,
                         .calibration = job.calibration,

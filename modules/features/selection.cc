@@ -148,7 +148,7 @@ FeatureFrame SelectFeatures(const std::vector<TileFeatures>& tiles) {
   const TileFeatures& first = *ordered.front();
   FeatureFrame frame{.frame = first.frame,
                      .utime_us = first.utime_us,
-                     .arrival_us = first.arrival_us,
+                     .captured_us = first.captured_us,
                      .calibration = first.calibration,
                      .keypoints = {},
                      .descriptors = {}};

@@ -115,7 +115,7 @@ TileGrid ParseTileGrid(const std::string& text) {
   return grid;
 }
 
-std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t arrival_us,
+std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t captured_us,
                               TileGrid grid, int coarse_levels_from, const FeatureOptions& options) {
   CheckFrame(frame, calibration, options);
   std::vector<TileJob> jobs;
@@ -126,7 +126,7 @@ std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration&
     TileJob& job = jobs.emplace_back();
     job.frame = frame.id;
     job.utime_us = frame.utime_us;
-    job.arrival_us = arrival_us;
+    job.captured_us = captured_us;
     job.calibration = calibration;
     job.options = options;
     job.first_level = first_level;

@@ -28,9 +28,9 @@ TileGrid ParseTileGrid(const std::string& text);
 // from `coarse_levels_from` up, of the whole image (their margins would be wide in level-0 pixels); then each tile of
 // the grid, line by line, has the levels below that. Tiles that have nothing to detect are left out.
 //
-// arrival_us is copied into the jobs. Throws InputError if the options, the calibration or the sizes of the images are
+// captured_us is copied into the jobs. Throws InputError if the options, the calibration or the sizes of the images are
 // wrong.
-std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t arrival_us,
+std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t captured_us,
                               TileGrid grid, int coarse_levels_from, const FeatureOptions& options);
 
 // Whether an extractor can work on the job: ranges and sizes are right, and the pixels that the core needs are there.

@@ -14,6 +14,7 @@ namespace tessera {
 struct CameraFrame {
   FrameId id;
   int64_t utime_us = 0;  // when it was taken, by the source's clock
+  int64_t age_us = 0;  // how long ago that is, when it leaves the camera process: to measure latency, no result uses it
   SensorType sensor = SensorType::kMono;
   GrayImage left;    // the only image of a mono or RGB-D camera
   GrayImage right;   // stereo only

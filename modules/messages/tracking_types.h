@@ -6,6 +6,7 @@
 
 #include "core/ids.h"
 #include "features/feature_types.h"
+#include "geometry/body_state.h"
 #include "geometry/rigid3.h"
 
 namespace tessera {
@@ -19,8 +20,9 @@ enum class TrackingState {
 // The pose of one frame as it was known at the time. Every frame that reaches the tracker gets one.
 struct PoseEstimate {
   FrameId frame;
-  int64_t utime_us = 0;    // when the image was taken
-  int64_t arrival_us = 0;  // see FeatureFrame
+  int64_t utime_us = 0;     // when the image was taken
+  int64_t captured_us = 0;  // see FeatureFrame
+  int64_t latency_us = 0;   // from then until the pose left the tracker; for measuring only
   TrackingState state = TrackingState::kInitializing;
   Rigid3 world_from_camera;       // valid if tracked. Mono: units of the map
   KeyframeId reference_keyframe;  // the keyframe that the pose is stored relative to
@@ -36,11 +38,16 @@ struct PoseEstimate {
   // Mono: by how much the scale may have changed in the last seconds (tracking/scale_watch.h), a standard deviation of
   // its logarithm. 0 where depth is measured.
   double scale_sigma = 0.0;
-  FrameId relocalized_by;   // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
-  int64_t num_deltas = 0;   // deltas that the map had seen by then: its step
-  bool is_live = false;     // the step is what happened to be there, not what logical time asks for
-  int64_t map_wait_us = 0;  // how long the frame had to wait for its step; for measuring only
+  FrameId relocalized_by;         // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
+  int64_t num_deltas = 0;         // deltas that the map had seen by then: its step
+  bool is_live = false;           // the step is what happened to be there, not what logical time asks for
+  int64_t map_wait_us = 0;        // how long the frame had to wait for its step; for measuring only
+  BodyState body;                 // valid if tracked; of the camera itself where no base is known
+  double coverage = 0.0;          // share of the image's cells (kCoverageColumns x kCoverageRows) that hold an inlier
+  int64_t since_tracked_us = -1;  // from the last frame with a pose to this one, 0 if it has one itself; -1: none had
 };
+
+inline constexpr int kCoverageColumns = 8, kCoverageRows = 6;
 
 // A keypoint that sees what a keypoint of an earlier keyframe saw, said before the tracker knows the landmark's id.
 struct SharedKeypoint {

@@ -11,6 +11,7 @@ const std::string& StageContext::name() const { return engine_.identity_.name; }
 int StageContext::id() const { return engine_.identity_.id; }
 int64_t StageContext::epoch_us() const { return engine_.identity_.epoch_us; }
 int64_t StageContext::now_us() const { return engine_.clock_->NowUs(); }
+int64_t StageContext::wall_us() const { return engine_.clock_->WallUs(); }
 
 int StageContext::AddStream(const Channel& channel) { return engine_.Advertise(channel); }
 

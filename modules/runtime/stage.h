@@ -64,6 +64,8 @@ class StageContext {
   // A clock that never jumps, for time-outs and rates only. Tests on a MemoryBus let it run as fast as they like, so
   // a stage asks this one and no other.
   int64_t now_us() const;
+  // The wall clock, for measuring only.
+  int64_t wall_us() const;
 
   // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
   // Throws std::runtime_error if the channel may have one publisher only and another process is it.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "features/feature_types.h"
+#include "geometry/rigid3.h"
 #include "map/map_archive.h"
 #include "messages/topics.h"
 
@@ -31,6 +32,9 @@ struct Like {
 };
 
 inline constexpr double kAnyCount = 1e9;
+
+// Empty, or [R | t]: 12 numbers row by row, separated by commas or spaces.
+bool IsRigidTransform(const std::string& text);
 
 // LCM takes channel names for regular expressions, and has room for 63 characters.
 bool IsChannelPrefix(const std::string& text);
@@ -85,6 +89,7 @@ struct CameraSettings {
   int last_frame = 0;
   int lockstep_window = 0;
   double depth_unit_m = 0.0;
+  double give_up_s = 0.0;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
@@ -96,6 +101,7 @@ struct CameraSettings {
     field("last_frame", self.last_frame, Range{-1, kAnyCount});
     field("lockstep_window", self.lockstep_window, Range{1, 1000, "frames"});
     field("depth_unit_m", self.depth_unit_m, Range{0, 1, "m"});
+    field("give_up_s", self.give_up_s, Range{0, 1e6, "s"});
   }
 };
 
@@ -105,6 +111,7 @@ struct DispatcherSettings {
   int max_queued_frames = 0;
   int max_frames_in_flight = 0;
   bool pack_tiles = false;
+  bool newest_wins = false;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
@@ -112,6 +119,7 @@ struct DispatcherSettings {
     field("pack_tiles", self.pack_tiles);
     field("max_queued_frames", self.max_queued_frames, Range{1, 100'000, "frames"});
     field("max_frames_in_flight", self.max_frames_in_flight, Range{1, 1000, "frames"});
+    field("newest_wins", self.newest_wins);
   }
 };
 
@@ -167,6 +175,19 @@ struct TrackerSettings {
   }
 };
 
+struct BodySettings {
+  static constexpr const char* kSection = "body";
+  std::string base_from_camera;
+
+  Rigid3 BaseFromCamera() const;
+
+  template <class Self, class Field>
+  static void Visit(Self& self, Field&& field) {
+    field("base_from_camera", self.base_from_camera,
+          Like{"empty or 12 numbers, a rotation and a translation [R | t] row by row", IsRigidTransform});
+  }
+};
+
 struct MapperSettings {
   static constexpr const char* kSection = "mapper";
   int max_inner_keyframes = 0;
@@ -209,11 +230,13 @@ struct LoopCloserSettings {
 struct EvaluatorSettings {
   static constexpr const char* kSection = "evaluator";
   std::string out_dir, save_map;
+  double save_period_s = 0.0;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
     field("out_dir", self.out_dir);
     field("save_map", self.save_map);
+    field("save_period_s", self.save_period_s, Range{0, 1e6, "s"});
   }
 };
 
@@ -240,7 +263,7 @@ struct RecorderSettings {
 };
 
 using AllSections = std::tuple<BusSettings, StreamTimingSettings, CameraSettings, DispatcherSettings, ExtractorSettings,
-                               FeaturesSettings, TrackerSettings, MapperSettings, LoopCloserSettings, EvaluatorSettings,
-                               MapWriterSettings, RecorderSettings>;
+                               FeaturesSettings, TrackerSettings, BodySettings, MapperSettings, LoopCloserSettings,
+                               EvaluatorSettings, MapWriterSettings, RecorderSettings>;
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -9,6 +10,7 @@
 #include <sstream>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 #include "core/errors.h"
 
@@ -136,7 +138,32 @@ void ForEachValue(const std::string& path, Visit visit) {
   }
 }
 
+constexpr double kMaxSkew = 1e-6;
+
+// nullopt: not 12 numbers, or not a rotation in front of the translation.
+std::optional<Rigid3> ParseRigid(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::istringstream words(text);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    const auto number = Parse<double>(word);
+    if (!number) return std::nullopt;
+    numbers.push_back(*number);
+  }
+  if (numbers.size() != 12) return std::nullopt;
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers.data());
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const bool is_rotation =
+      (rotation * rotation.transpose()).isIdentity(kMaxSkew) && rotation.determinant() > 0.0 && matrix.allFinite();
+  if (!is_rotation) return std::nullopt;
+  return Rigid3::FromMatrix(rotation, matrix.col(3));
+}
+
 }  // namespace
+
+bool IsRigidTransform(const std::string& text) { return text.empty() || ParseRigid(text); }
+
+Rigid3 BodySettings::BaseFromCamera() const { return ParseRigid(base_from_camera).value_or(Rigid3::Identity()); }
 
 bool IsChannelPrefix(const std::string& text) {
   return text.size() <= 32 && std::all_of(text.begin(), text.end(), [](unsigned char c) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 #include <utility>
 
@@ -32,6 +33,22 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
                                  : DepthInformation(view.features(), keypoint, Rigid3::Identity(), point);
   point.depth_sigma = DepthSigma(information, point_in_camera.norm());
   return point;
+}
+
+// The share of the image's cells that hold a keypoint whose point agrees with the pose.
+double CellCoverage(const TrackedFrame& frame) {
+  std::array<bool, kCoverageColumns * kCoverageRows> is_covered{};
+  const CameraCalibration& camera = frame.view->features().calibration;
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (!frame.points[i].valid()) continue;
+    const Keypoint& keypoint = frame.view->features().keypoints[i];
+    const auto cell = [](float at_px, int size_px, int num) {
+      return std::clamp(static_cast<int>(at_px * static_cast<float>(num) / static_cast<float>(size_px)), 0, num - 1);
+    };
+    const int row = cell(keypoint.y_px, camera.height_px, kCoverageRows);
+    is_covered[Index(kCoverageColumns * row + cell(keypoint.x_px, camera.width_px, kCoverageColumns))] = true;
+  }
+  return static_cast<double>(std::ranges::count(is_covered, true)) / static_cast<double>(is_covered.size());
 }
 
 }  // namespace
@@ -89,6 +106,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
     result.pose.state = has_started ? TrackingState::kTracked : TrackingState::kLost;
   }
   if (result.pose.state == TrackingState::kTracked) DescribePose(result);
+  if (tracked_utime_us_) result.pose.since_tracked_us = features.utime_us - *tracked_utime_us_;
   previous_utime_us_ = features.utime_us;
   return result;
 }
@@ -102,7 +120,7 @@ MapTrackingResult MapTracker::UndecidedResult(const FrameView& view) const {
   MapTrackingResult result;
   result.pose.frame = view.features().frame;
   result.pose.utime_us = view.features().utime_us;
-  result.pose.arrival_us = view.features().arrival_us;
+  result.pose.captured_us = view.features().captured_us;
   result.pose.num_features = view.size();
   result.pose.num_landmarks = static_cast<int32_t>(replica_.map().landmarks().size());
   return result;
@@ -122,6 +140,23 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
   result.pose.is_keyframe = !result.keyframes.empty();
   result.pose.is_step_doubtful = last_->evidence == StepEvidence::kContradictory;
   result.pose.scale_sigma = scale_.RecentDrift(result.pose.utime_us);
+  result.pose.coverage = CellCoverage(last_->frame);
+  result.pose.body = DescribeBody();
+  tracked_utime_us_ = result.pose.utime_us;
+}
+
+// The camera as a body of its own.
+BodyState MapTracker::DescribeBody() const {
+  BodyState body{.world_from_base = last_->frame.world_from_camera};
+  if (last_->pose_covariance) {
+    body.covariance = *last_->pose_covariance;
+    body.has_covariance = true;
+  }
+  if (motion_.is_known()) {
+    body.motion = {WorldFromReference().scale * motion_.velocity(), motion_.turn_rate()};
+    body.has_motion = true;
+  }
+  return body;
 }
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
@@ -395,7 +430,8 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
   LearnReadout(frame);
   lost_since_us_.reset();
-  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, is_wide_step});
+  last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, is_wide_step,
+                     PoseCovariance(pose.optimized.information)});
 }
 
 void MapTracker::LearnReadout(const TrackedFrame& frame) {

@@ -90,6 +90,7 @@ class MapTracker {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    // of the camera's center, in its axes and those units
     std::optional<CameraMotion> mean_motion = std::nullopt;  // since the frame before, in units of the world
     bool is_wide_step = false;                               // FoundFrame::is_wide
+    std::optional<Matrix6d> pose_covariance = std::nullopt;  // PoseCovariance, in units of the world
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -110,6 +111,7 @@ class MapTracker {
 
   MapTrackingResult UndecidedResult(const FrameView& view) const;
   void DescribePose(MapTrackingResult& result);
+  BodyState DescribeBody() const;
   bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
@@ -159,6 +161,7 @@ class MapTracker {
   std::optional<Drift> drift_;     // of the last loss
   ScaleWatch scale_;               // mono
   int64_t previous_utime_us_ = 0;  // of the frame before
+  std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last
 };

@@ -37,6 +37,10 @@ class MotionModel {
   // nullopt before the first motion. The camera turns on as it did, or by `last_from_current`, if that is known.
   std::optional<MotionPrediction> Predict(double interval_s) const;
   std::optional<MotionPrediction> Predict(double interval_s, const Eigen::Quaterniond& last_from_current) const;
+  // How the camera moved in the middle of the last step, in its axes then, filtered; unknown before the first motion.
+  bool is_known() const { return num_motions_ > 0; }
+  const Eigen::Vector3d& velocity() const { return velocity_; }    // units/s
+  const Eigen::Vector3d& turn_rate() const { return turn_rate_; }  // rad/s
 
  private:
   void LearnNoise(const Eigen::Vector3d& measured, double interval_s);

@@ -62,6 +62,18 @@ KeyframeId LogicalTime::LastDue(FrameId frame) const {
   return due;
 }
 
+void LiveTime::KeyframeSent(KeyframeId id, FrameId at) {
+  TrackerTime::KeyframeSent(id, at);
+  if (at != last_at_) first_of_last_ = id;
+  last_at_ = at;
+}
+
+// A frame makes no keyframe before those of the frames before it are sent: only the last ones can be open in part.
+bool LiveTime::IsDue(const MapDelta& delta, FrameId /*frame*/) const {
+  const bool is_of_last = first_of_last_.valid() && delta.answers >= first_of_last_;
+  return !is_of_last || answered_ >= last_sent_;
+}
+
 const RelocalizationAnswer* LiveTime::TakeAnswer(FrameId /*frame*/) {
   if (!asked_.valid() || !IsAnswered()) return nullptr;
   asked_ = {};

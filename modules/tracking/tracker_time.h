@@ -3,7 +3,9 @@
 //   LogicalTime  Frame f sees exactly the deltas that answer keyframes of frames <= f - D, and the answer to its own
 //                question. What comes early is held back, what is missing is waited for: the same input gives the same
 //                result.
-//   LiveTime     A frame sees what is there. It never waits; an answer serves the frame that is next when it comes.
+//   LiveTime     A frame sees what is there, but for the answer to one of several keyframes of one frame, which comes
+//                with the others: mono's first points belong to two. It never waits; an answer serves the frame that is
+//                next when it comes.
 //   ReplayTime   Each frame sees what it saw in a live run that was recorded.
 #pragma once
 
@@ -102,6 +104,7 @@ class LiveTime : public TrackerTime {
   // `may_ask`: a frame may ask where it was taken, if no question is open.
   explicit LiveTime(bool may_ask = true) : may_ask_(may_ask) {}
 
+  void KeyframeSent(KeyframeId id, FrameId at) override;
   bool HasDeltas(FrameId) const override { return true; }
   bool MayAsk(FrameId) const override { return may_ask_ && !asked_.valid(); }
   bool AwaitsAnswer(FrameId) const override { return false; }
@@ -109,9 +112,11 @@ class LiveTime : public TrackerTime {
   bool is_live() const override { return true; }
 
  private:
-  bool IsDue(const MapDelta&, FrameId) const override { return true; }
+  bool IsDue(const MapDelta& delta, FrameId frame) const override;
 
   const bool may_ask_;
+  FrameId last_at_;           // the frame that made the last keyframe
+  KeyframeId first_of_last_;  // the first keyframe that it made
 };
 
 // Sends no questions: the answers that were used stand in the log.

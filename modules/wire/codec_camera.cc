@@ -37,6 +37,7 @@ struct Layout<camera_image_t> {
   static void Describe(Fields& fields, Message& message, Value& frame) {
     fields.Key(message.frame, frame.id);
     fields.Time(message.utime, frame.utime_us);
+    fields.Time(message.age, frame.age_us);
     fields.Key(message.sensor, frame.sensor);
     fields.Key(message.width, frame.left.width);
     fields.Key(message.height, frame.left.height);

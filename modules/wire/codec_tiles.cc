@@ -24,7 +24,7 @@ void DescribeTile(Fields& fields, Message& message, Value& tile) {
   fields.Key(message.frame, tile.frame);
   fields(message.previous_frame, tile.previous_frame);
   fields.Time(message.utime, tile.utime_us);
-  fields.Time(message.arrival, tile.arrival_us);
+  fields.Time(message.captured, tile.captured_us);
   fields.Key(message.tile, tile.tile);
   fields.Key(message.num_tiles, tile.num_tiles);
   fields(message.camera, tile.calibration);

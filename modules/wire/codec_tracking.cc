@@ -73,7 +73,8 @@ struct Layout<pose_t> {
   static void Describe(Fields& fields, Message& message, Value& pose) {
     fields(message.frame, pose.frame);
     fields.Time(message.utime, pose.utime_us);
-    fields.Time(message.arrival, pose.arrival_us);
+    fields.Time(message.captured, pose.captured_us);
+    fields.Time(message.latency, pose.latency_us);
     fields(message.state, pose.state);
     fields(message.world_from_camera, pose.world_from_camera);
     fields(message.reference_keyframe, pose.reference_keyframe);
@@ -90,6 +91,14 @@ struct Layout<pose_t> {
     fields.Count(message.num_deltas, pose.num_deltas);
     fields(message.is_live, pose.is_live);
     fields.Count(message.map_wait_us, pose.map_wait_us);
+    fields(message.world_from_base, pose.body.world_from_base);
+    fields(message.has_covariance, pose.body.has_covariance);
+    fields(message.covariance, pose.body.covariance);
+    fields(message.has_velocity, pose.body.has_motion);
+    fields(message.linear_velocity, pose.body.motion.velocity);
+    fields(message.angular_velocity, pose.body.motion.turn_rate);
+    fields(message.coverage, pose.coverage);
+    fields.Time(message.since_tracked, pose.since_tracked_us);
     fields.Check(pose.frame.valid(), "its frame number is negative");
     fields.Check(pose.relocalized_by <= pose.frame, "the frame that it was relocalized by is newer");
     fields.Check(pose.scale_sigma >= 0.0, "the deviation of its scale is negative");

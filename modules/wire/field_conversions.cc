@@ -52,6 +52,20 @@ Result<> ReadField(const double (&field)[3][3], Eigen::Matrix3d& information) {
   return Require(is_in_range, "the information of a position is not symmetric, negative or too large");
 }
 
+void WriteField(const Matrix6d& covariance, double (&field)[6][6]) {
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 6; ++column) field[row][column] = covariance(row, column);
+  }
+}
+Result<> ReadField(const double (&field)[6][6], Matrix6d& covariance) {
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 6; ++column) covariance(row, column) = field[row][column];
+  }
+  const bool is_in_range =
+      covariance.allFinite() && covariance.diagonal().minCoeff() >= 0.0 && covariance == covariance.transpose();
+  return Require(is_in_range, "the covariance of a pose is not finite, not symmetric or negative");
+}
+
 void WriteField(const Rigid3& transform, rigid3_t& field) {
   const Eigen::Quaterniond& q = transform.rotation;
   const double rotation_wxyz[] = {q.w(), q.x(), q.y(), q.z()};

@@ -13,6 +13,7 @@
 #include "core/image.h"
 #include "core/result.h"
 #include "features/feature_types.h"
+#include "geometry/body_state.h"
 #include "geometry/camera.h"
 #include "geometry/rigid3.h"
 #include "tessera/camera_model_t.hpp"
@@ -87,6 +88,10 @@ Result<> ReadField(const double (&field)[3], Eigen::Vector3d& vector);
 // The information of a position: symmetric, finite, and no more than 10^18 or less than zero along an axis.
 void WriteField(const Eigen::Matrix3d& information, double (&field)[3][3]);
 Result<> ReadField(const double (&field)[3][3], Eigen::Matrix3d& information);
+
+// The covariance of a pose: symmetric, finite, and not less than zero along an axis.
+void WriteField(const Matrix6d& covariance, double (&field)[6][6]);
+Result<> ReadField(const double (&field)[6][6], Matrix6d& covariance);
 
 // Translations as positions; quaternions of length 1; scales within 10^-9 .. 10^9.
 void WriteField(const Rigid3& transform, rigid3_t& field);

@@ -18,7 +18,7 @@ template <class Fields, class Message, class Frame, class... More>
 void DescribeKeypoints(Fields& fields, Message& message, Frame& frame, More... more) {
   fields.Key(message.frame, frame.frame);
   fields.Time(message.utime, frame.utime_us);
-  fields.Time(message.arrival, frame.arrival_us);
+  fields.Time(message.captured, frame.captured_us);
   fields(message.camera, frame.calibration);
   fields.Check(frame.frame.valid(), "its frame number is negative");
   auto& keypoints = frame.keypoints;

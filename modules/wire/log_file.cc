@@ -1,5 +1,7 @@
 #include "wire/log_file.h"
 
+#include <unistd.h>
+
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -108,7 +110,9 @@ void LogFileWriter::Write(int64_t time_us, const std::string& channel, ByteView 
 
 void LogFileWriter::Close() {
   if (file_ == nullptr) return;
-  const bool is_written = std::fclose(file_) == 0;
+  // On the disk before it takes its name: a machine that loses power keeps the file that was there.
+  const bool is_on_disk = std::fflush(file_) == 0 && fsync(fileno(file_)) == 0;
+  const bool is_written = std::fclose(file_) == 0 && is_on_disk;
   file_ = nullptr;
   if (is_written && std::rename((path_ + ".part").c_str(), path_.c_str()) == 0) return;
   const int problem = errno;

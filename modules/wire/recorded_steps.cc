@@ -14,6 +14,7 @@ RecordedSteps ReadRecordedSteps(const std::string& path, const std::string& chan
   LogFileReader file(path);
   ValueJoiner<PoseEstimate> poses;
   ValueJoiner<RelocalizationAnswer> answers;
+  ValueJoiner<EndOfStream> ends;
   // The value that the event completes; null if it doesn't.
   const auto join = [&](auto& joiner, const LogEvent& event) {
     const auto header = ReadHeader(event.data);
@@ -24,6 +25,9 @@ RecordedSteps ReadRecordedSteps(const std::string& path, const std::string& chan
   for (LogEvent event; file.Next(&event);) {
     if (event.channel == channel_prefix + kRelocalization.name) {
       if (const RelocalizationAnswer* answer = join(answers, event)) recorded.relocalizations[answer->frame] = *answer;
+    } else if (event.channel == channel_prefix + kEndOfStream.name) {
+      const EndOfStream* end = join(ends, event);
+      if (end != nullptr && end->stage == StageKind::kTracker) recorded.has_drops = end->num_dropped > 0;
     } else if (event.channel == channel_prefix + kPose.name) {
       const PoseEstimate* pose = join(poses, event);
       if (pose == nullptr) continue;

@@ -32,6 +32,8 @@ MAX_OUTPUT_BYTES = 2000
 TAIL_PIECE_BYTES = 1000
 LOG_FILE_BYTES = 10_000_000
 NUM_OLD_LOG_FILES = 3
+# Of a live run: one that is extracted while another is tracked. More of them would wait for the tracker.
+LIVE_FRAMES_IN_FLIGHT = 2
 # More extractors than this are shown as one, in the live panel and in reports.
 MAX_EXTRACTORS_SHOWN = 4
 
@@ -49,6 +51,7 @@ OUTPUT_PERIOD_S = 0.2
 ORDER_REPEAT_S = 0.3
 STOP_POLL_S = 0.01
 RECORDING_POLL_S = 0.1
+MAP_SAVE_PERIOD_S = 60.0
 EXPERIMENT_POLL_S = 0.1
 RUN_PANEL_PERIOD_S = 0.25
 WATCH_PANEL_PERIOD_S = 0.5

@@ -41,6 +41,16 @@ TEST(Pacer, TimedFollowsTheSourcesTimestamps) {
   EXPECT_FALSE(pacer.MayGo(5'000'000, 900'000));
 }
 
+TEST(Pacer, AFrameIsAsOldAsItsTimeIsPast) {
+  Pacer pacer({.kind = PacerOptions::Kind::kTimed, .speed = 2.0});
+  ASSERT_TRUE(pacer.MayGo(1'000'000, 50));
+  EXPECT_EQ(pacer.LatenessUs(1'000'000, 50), 0);
+  EXPECT_EQ(pacer.LatenessUs(1'100'000, 50'350), 300) << "it was due at 50'050";
+  EXPECT_EQ(pacer.LatenessUs(1'100'000, 50'000), 0);
+  Pacer lockstep({.kind = PacerOptions::Kind::kLockstep});
+  EXPECT_EQ(lockstep.LatenessUs(1'000'000, 900'000), 0) << "no camera is waited for";
+}
+
 TEST(Pacer, FreeNeverWaits) {
   Pacer pacer({.kind = PacerOptions::Kind::kFree});
   for (int frame = 0; frame < 100; ++frame) {

@@ -27,10 +27,11 @@ CameraFrame Frame(int64_t id, int width = 320) {
 
 class Dispatcher {
  public:
-  explicit Dispatcher(int max_queued_frames = 32, int64_t max_kept_bytes = 1'000'000)
+  explicit Dispatcher(int max_queued_frames = 32, int64_t max_kept_bytes = 1'000'000, bool newest_wins = false)
       : session({.queue = {.max_queued_frames = max_queued_frames},
                  .epoch_us = kEpochUs,
-                 .max_kept_bytes = max_kept_bytes}) {}
+                 .max_kept_bytes = max_kept_bytes,
+                 .newest_wins = newest_wins}) {}
 
   void Calibrate() { session.Receive(kCalibration); }
   void Send(int64_t id) { Send(Frame(id)); }
@@ -159,6 +160,97 @@ TEST(DispatcherSession, WhatTheCameraKeptForANewDispatcherIsAllTaken) {
   dispatcher.Calibrate();
   for (int64_t id = 0; id < 6; ++id) dispatcher.SendOld(id);
   EXPECT_EQ(dispatcher.WorkOffAll(), (Frames{0, 1, 2, 3})) << "up to what a camera's history holds";
+}
+
+TEST(DispatcherSession, LiveTheNewestFrameTakesThePlaceOfTheOneThatWaits) {
+  Dispatcher dispatcher(32, 1'000'000, true);
+  dispatcher.Calibrate();
+  for (int64_t id = 0; id < 4; ++id) dispatcher.Send(id);
+  EXPECT_EQ(dispatcher.session.queue().num_waiting(), 1);
+  EXPECT_EQ(dispatcher.session.num_dropped(), 3);
+  EXPECT_TRUE(dispatcher.session.TakeReports().empty()) << "one sentence for many of them";
+  EXPECT_EQ(dispatcher.WorkOffAll(), Frames{3});
+  dispatcher.EndCamera(4);
+  const auto end = dispatcher.session.End(0);
+  ASSERT_TRUE(end);
+  EXPECT_EQ(end->num_frames, 4);
+  EXPECT_EQ(end->num_dropped, 3);
+}
+
+TEST(DispatcherSession, LiveTheFrameBeforeIsTheLastThatWasNotDropped) {
+  Dispatcher dispatcher(32, 1'000'000, true);
+  dispatcher.Calibrate();
+  dispatcher.Send(0);
+  dispatcher.WorkOffAll();
+  for (const int64_t id : {1, 2}) dispatcher.session.Receive(Frame(id), {kCameraEpochUs, kEpochUs + 1, 0}, 0);
+  ASSERT_TRUE(dispatcher.session.CanGive());
+  const TileJob job = *dispatcher.session.GiveNext(0).job;
+  EXPECT_EQ(job.frame.value, 2);
+  EXPECT_EQ(job.previous_frame.value, 0) << "the order in which the reassembler releases frames";
+}
+
+TEST(DispatcherSession, WhatTheDispatcherBeforeHadGivenOutDoesNotCountAsDropped) {
+  Dispatcher dispatcher(32, 1'000'000, true);
+  dispatcher.Calibrate();
+  for (int64_t id = 0; id < 4; ++id) dispatcher.SendOld(id);
+  EXPECT_EQ(dispatcher.session.num_dropped(), 3);
+  dispatcher.session.MarkTracked({0});
+  dispatcher.session.MarkTracked({2});
+  EXPECT_EQ(dispatcher.session.num_dropped(), 1) << "frame 1 has no pose";
+  EXPECT_EQ(dispatcher.WorkOffAll(), Frames{3});
+}
+
+TEST(DispatcherSession, AProgramThatIsStartedAgainIsContinued) {
+  DispatcherSession session({.epoch_us = kEpochUs, .newest_wins = true, .renumbers = true});
+  session.Receive(kCalibration);
+  session.Receive(ExtractorReady{.extractor = 0, .epoch_us = 1}, 0);
+  session.Receive(TileAck{.frame = {0}, .tiles = {}}, kReassemblerEpochUs);
+  const auto send = [&](int64_t id, int64_t camera_epoch_us, int64_t now_us) {
+    CameraFrame frame = Frame(id);
+    frame.utime_us = 100'000 * id;
+    session.Receive(frame, {camera_epoch_us, kEpochUs + now_us, kEpochUs + now_us}, now_us);
+    const TileJob job = *session.GiveNext(now_us).job;
+    session.Receive(TileAck{.frame = job.frame, .tiles = {job.tile}}, kReassemblerEpochUs);
+    session.MarkTracked(job.frame);
+    return std::pair(job.frame.value, job.utime_us);
+  };
+  EXPECT_EQ(send(7, kCameraEpochUs, 0), std::pair(7L, 700'000L));
+  EXPECT_EQ(send(0, kCameraEpochUs + 1, 5'000'000), std::pair(8L, 5'700'000L)) << "five seconds later";
+  EXPECT_EQ(send(1, kCameraEpochUs + 1, 5'100'000), std::pair(9L, 5'800'000L));
+  EXPECT_EQ(session.num_dropped(), 0);
+  session.Receive(EndOfStream{.stage = StageKind::kCamera, .num_frames = 2}, 5'200'000);
+  const auto end = session.End(5'200'000);
+  ASSERT_TRUE(end);
+  EXPECT_EQ(end->num_frames, 10);
+}
+
+TEST(DispatcherSession, ASilentSourceIsToldAndGivenUp) {
+  DispatcherSession session({.epoch_us = kEpochUs, .newest_wins = true, .give_up_us = 10'000'000});
+  session.Receive(kCalibration);
+  session.Receive(Frame(0), {kCameraEpochUs, kEpochUs + 1, kEpochUs + 2}, 0);
+  session.MarkTracked({0});
+  session.Watch(9'000'000);
+  EXPECT_EQ(session.SilenceUs(9'000'000), 9'000'000);
+  EXPECT_EQ(session.TakeReports().size(), 1U);
+  EXPECT_FALSE(session.End(9'000'000));
+  session.Watch(10'000'000);
+  EXPECT_EQ(session.TakeReports().size(), 1U);
+  const auto end = session.End(10'000'000);
+  ASSERT_TRUE(end);
+  EXPECT_EQ(end->num_frames, 1);
+}
+
+TEST(DispatcherSession, FramesAreStampedWithTheTimeAtWhichTheyWereTaken) {
+  Dispatcher dispatcher;
+  dispatcher.Calibrate();
+  CameraFrame frame = Frame(0);
+  frame.age_us = 300;
+  dispatcher.session.Receive(frame, {kCameraEpochUs, kEpochUs + 1000, kEpochUs + 5000}, 0);
+  dispatcher.session.Receive(Frame(1), {kCameraEpochUs, kEpochUs - 1, kEpochUs + 9000}, 0);
+  dispatcher.session.Receive(ExtractorReady{.extractor = 0, .epoch_us = 1}, 0);
+  dispatcher.session.Receive(TileAck{.frame = {0}, .tiles = {}}, kReassemblerEpochUs);
+  EXPECT_EQ(dispatcher.session.GiveNext(0).job->captured_us, kEpochUs + 700);
+  EXPECT_EQ(dispatcher.session.GiveNext(0).job->captured_us, kEpochUs + 9000) << "a played log's clock is an old one";
 }
 
 TEST(DispatcherSession, AFrameUnlikeItsCalibrationIsDropped) {

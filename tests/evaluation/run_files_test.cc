@@ -11,6 +11,7 @@
 #include "core/errors.h"
 #include "core/files.h"
 #include "evaluation/pose_text.h"
+#include "geometry/body_state.h"
 #include "support/matchers.h"
 #include "support/temporary_folder.h"
 
@@ -30,7 +31,7 @@ class RunFilesTest : public testing::Test {
       PoseEstimate pose;
       pose.frame = FrameId{i};
       pose.utime_us = 1'403'636'584'763'555 + i;
-      pose.arrival_us = 1'000'000;
+      pose.captured_us = 1'000'000;
       pose.state = static_cast<TrackingState>(i);
       pose.world_from_camera.translation = {0.25 * i, -1.0, 2.0};
       pose.num_features = 2000;
@@ -113,6 +114,17 @@ TEST_F(RunFilesTest, TrajectoryHoldsTrackedFramesOnly) {
   const std::string kitti = Read("trajectory_kitti.txt"), truth = Read("ground_truth.txt");
   EXPECT_EQ(std::count(kitti.begin(), kitti.end(), '\n'), 3);
   EXPECT_EQ(std::count(truth.begin(), truth.end(), '\n'), 4);
+}
+
+TEST_F(RunFilesTest, PosesAreThoseOfTheBodyAndTheHashesStay) {
+  WriteRun(SmallRun(), folder_);
+  const std::string run = Read("run.json");
+  WriteRun(SmallRun(), folder_, {ForwardLeftUpFromCamera().rotation, {0.3, 0.0, 0.12}});
+  EXPECT_EQ(Read("run.json"), run);
+  EXPECT_EQ(Read("trajectory.txt"),
+            "# timestamp tx ty tz qx qy qz qw\n"
+            "1403636584.763556 2.000000000 -0.250000000 1.000000000 0.000000000 0.000000000 0.000000000 "
+            "1.000000000\n");
 }
 
 TEST_F(RunFilesTest, TrajectorySaysThatItsPartsAreNotJoined) {

@@ -16,7 +16,7 @@ PoseEstimate Pose(int64_t frame, TrackingState state, double x = 0.0) {
   PoseEstimate pose;
   pose.frame = FrameId{frame};
   pose.utime_us = 100'000 * frame;
-  pose.arrival_us = 5'000'000 + 10'000 * frame;
+  pose.captured_us = 5'000'000 + 10'000 * frame;
   pose.state = state;
   pose.world_from_camera.translation = {x, 0.0, 0.0};
   pose.num_landmarks = static_cast<int32_t>(100 + frame);
@@ -259,7 +259,7 @@ TEST(RunRecord, TheHashDependsOnEveryBitButNotOnTheOrderOfArrivalNorOnTimes) {
   for (int i = 0; i < 3; ++i) {
     forward.AddPose(Pose(i, kTracked, i), 100 + i);
     PoseEstimate late = Pose(2 - i, kTracked, 2 - i);
-    late.arrival_us = 1;
+    late.captured_us = 1;
     late.map_wait_us = 77;
     backward.AddPose(late, 500 + i);
   }

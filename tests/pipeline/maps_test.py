@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from helpers.stack import NUM_FRAMES, ROOT, Finished, Tessera
+from helpers.stack import NUM_FRAMES, ROOT, Finished, Tessera, wait_for
 from helpers.synthetic_sequence import HEIGHT_PX, WIDTH_PX
 
 BLACK = f"P5 {WIDTH_PX} {HEIGHT_PX} 255\n".encode() + bytes(WIDTH_PX * HEIGHT_PX)
@@ -130,3 +130,20 @@ def test_wrong_arguments_about_maps(tessera: Tessera, sequence: Path, arguments:
 
 def test_the_vocabulary_is_part_of_the_project() -> None:
     assert (ROOT / "config" / "vocabulary.tvoc").stat().st_size < 8_000_000
+
+
+def test_a_map_lasts_over_runs_and_a_loss_of_power(tessera: Tessera, sequence: Path, tmp_path: Path) -> None:
+    """Saved while the run goes on; what was being written when everything was killed does not replace it."""
+    lasting = tmp_path / "home.tessera"
+    first = tessera.run(f"kitti:{sequence}", "--map", lasting, "--frames", "0:30").must_end_well()
+    saved = lasting.read_bytes()
+    assert saved == (first.folder / "map.tessera").read_bytes()
+    folder = tmp_path / "killed"
+    words = ("--map", lasting, "--pace", "0.3", "--set", "evaluator.save_period_s=0.2")
+    second = tessera.start("run", f"kitti:{sequence}", *words, "--port", tessera.next_port(), "--out", folder)
+    wait_for(lambda: lasting.read_bytes() != saved, "a newer map")
+    second.kill()  # the guard kills its stages
+    second.wait()
+    third = tessera.run(f"kitti:{sequence}", "--map", lasting, "--localize-only").must_end_well()
+    assert third.summary["frames_tracked"] > 0.8 * NUM_FRAMES
+    tessera.run(f"kitti:{sequence}", "--map", lasting, "--save-map", lasting).must_refuse("--map", "--save-map")

@@ -75,6 +75,17 @@ TEST(Settings, AValueMustBeInItsRange) {
   EXPECT_EQ(ErrorOfSet("bus.channel_prefix=robot_1/"), "");
 }
 
+TEST(Settings, APlaceOnTheBodyIsARotationAndATranslation) {
+  Settings settings = Settings::LoadDefaults(kShipped);
+  EXPECT_LT(settings.Get<BodySettings>().BaseFromCamera().translation.norm(), 1e-15) << "the camera is the body";
+  settings.Override("body.base_from_camera=0 0 1 0.3, -1 0 0 0, 0 -1 0 0.12");
+  const Rigid3 base_from_camera = settings.Get<BodySettings>().BaseFromCamera();
+  EXPECT_LT((base_from_camera * Eigen::Vector3d(0, 0, 2) - Eigen::Vector3d(2.3, 0, 0.12)).norm(), 1e-12);
+  for (const char* wrong : {"0 0 1", "0 0 2 0.3 -1 0 0 0 0 -1 0 0.12", "0 0 1 0.3 -1 0 0 0 0 1 0 0.12", "a b"}) {
+    EXPECT_THAT(ErrorOfSet(std::string("body.base_from_camera=") + wrong), HasSubstr("[R | t] row by row")) << wrong;
+  }
+}
+
 TEST(Settings, ASentenceNamesTheFileAndTheKey) {
   Settings settings = Settings::LoadDefaults(kShipped);
   const std::string path = Write("user.yaml", "camera:\n  widow: 1\n");

@@ -114,7 +114,7 @@ TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
   job.frame = {Draw(generator, 1, 9999)};
   job.previous_frame = {job.frame.value - 1};
   job.utime_us = Draw(generator, 0, 1 << 30);
-  job.arrival_us = Draw(generator, 0, 1 << 30);
+  job.captured_us = Draw(generator, 0, 1 << 30);
   job.num_tiles = Draw(generator, 1, 17);
   job.tile = job.num_tiles - 1;
   job.calibration = DrawCalibration(generator, width, height);
@@ -145,7 +145,7 @@ TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   features.frame = {Draw(generator, 1, 9999)};
   features.previous_frame = {Draw(generator, -1, 0)};
   features.utime_us = Draw(generator, 0, 1 << 30);
-  features.arrival_us = Draw(generator, 0, 1 << 30);
+  features.captured_us = Draw(generator, 0, 1 << 30);
   features.num_tiles = 3;
   features.tile = Draw(generator, 0, 2);
   features.calibration = DrawCalibration(generator, 640, 480);
@@ -198,7 +198,7 @@ FeatureFrame DrawValue<FeatureFrame>(std::mt19937& generator, int size) {
   FeatureFrame frame;
   frame.frame = {Draw(generator, 0, 9999)};
   frame.utime_us = Draw(generator, 0, 1 << 30);
-  frame.arrival_us = Draw(generator, 0, 1 << 30);
+  frame.captured_us = Draw(generator, 0, 1 << 30);
   frame.calibration = DrawCalibration(generator, 1241, 376);
   const int num_keypoints = size == 0 ? 0 : Draw(generator, 100, 3000);
   for (int i = 0; i < num_keypoints; ++i) {
@@ -215,7 +215,7 @@ FeatureFrame DrawValue<FeatureFrame>(std::mt19937& generator, int size) {
 }
 template <>
 bool AreSame(const FeatureFrame& a, const FeatureFrame& b) {
-  return a.frame == b.frame && a.utime_us == b.utime_us && a.arrival_us == b.arrival_us &&
+  return a.frame == b.frame && a.utime_us == b.utime_us && a.captured_us == b.captured_us &&
          a.calibration == b.calibration && a.keypoints == b.keypoints && a.descriptors == b.descriptors;
 }
 
@@ -487,11 +487,31 @@ bool AreSame(const RelocalizationAnswer& a, const RelocalizationAnswer& b) {
          a.num_candidates == b.num_candidates;
 }
 
+static BodyState DrawBody(std::mt19937& generator) {
+  BodyState body{.world_from_base = DrawPose(generator)};
+  Matrix6d factor;
+  for (int i = 0; i < factor.size(); ++i) factor(i) = Draw(generator, -9, 9);
+  body.covariance = factor * factor.transpose();  // of whole numbers, so that it is symmetric to the bit
+  for (int axis = 0; axis < 3; ++axis) {
+    body.motion.velocity[axis] = Draw(generator, -9, 9);
+    body.motion.turn_rate[axis] = Draw(generator, -9, 9);
+  }
+  body.has_covariance = Draw(generator, 0, 1) == 1;
+  body.has_motion = Draw(generator, 0, 1) == 1;
+  return body;
+}
+static bool AreSameBody(const BodyState& a, const BodyState& b) {
+  return AreSamePose(a.world_from_base, b.world_from_base) && a.covariance == b.covariance &&
+         a.motion.velocity == b.motion.velocity && a.motion.turn_rate == b.motion.turn_rate &&
+         a.has_covariance == b.has_covariance && a.has_motion == b.has_motion;
+}
+
 template <>
 PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
   return {.frame = {Draw(generator, 0, 9999)},
           .utime_us = Draw(generator, 0, 1 << 30),
-          .arrival_us = Draw(generator, 0, 1 << 30),
+          .captured_us = Draw(generator, 0, 1 << 30),
+          .latency_us = Draw(generator, 0, 1 << 20),
           .state = static_cast<TrackingState>(Draw(generator, 0, 2)),
           .world_from_camera = DrawPose(generator),
           .reference_keyframe = {Draw(generator, -1, 99)},
@@ -507,18 +527,23 @@ PoseEstimate DrawValue<PoseEstimate>(std::mt19937& generator, int) {
           .relocalized_by = {Draw(generator, -1, 99)},
           .num_deltas = Draw(generator, 0, 99),
           .is_live = Draw(generator, 0, 1) == 1,
-          .map_wait_us = Draw(generator, 0, 9999)};
+          .map_wait_us = Draw(generator, 0, 9999),
+          .body = DrawBody(generator),
+          .coverage = 0.25 * Draw(generator, 0, 4),
+          .since_tracked_us = Draw(generator, -1, 1 << 30)};
 }
 template <>
 bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
-  return a.frame == b.frame && a.utime_us == b.utime_us && a.arrival_us == b.arrival_us && a.state == b.state &&
-         AreSamePose(a.world_from_camera, b.world_from_camera) && a.reference_keyframe == b.reference_keyframe &&
+  return a.frame == b.frame && a.utime_us == b.utime_us && a.captured_us == b.captured_us &&
+         a.latency_us == b.latency_us && a.state == b.state && AreSamePose(a.world_from_camera, b.world_from_camera) &&
+         a.reference_keyframe == b.reference_keyframe &&
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_features == b.num_features &&
          a.num_matches == b.num_matches && a.num_inliers == b.num_inliers && a.num_landmarks == b.num_landmarks &&
          a.is_keyframe == b.is_keyframe && a.is_relocalized == b.is_relocalized &&
          a.is_step_doubtful == b.is_step_doubtful && a.scale_sigma == b.scale_sigma &&
          a.relocalized_by == b.relocalized_by && a.num_deltas == b.num_deltas && a.is_live == b.is_live &&
-         a.map_wait_us == b.map_wait_us;
+         a.map_wait_us == b.map_wait_us && AreSameBody(a.body, b.body) && a.coverage == b.coverage &&
+         a.since_tracked_us == b.since_tracked_us;
 }
 
 template <>

@@ -129,6 +129,21 @@ TEST(LogicalTime, AFrameAsksOnceAndWaitsForItsAnswer) {
   EXPECT_TRUE(time.MayAsk({8}));
 }
 
+// Mono's first points belong to the first of its two keyframes, and the map has them with the second one's answer.
+TEST(LiveTime, TheAnswersToTheKeyframesOfOneFrameAreSeenTogether) {
+  LiveTime time;
+  time.KeyframeSent({0}, {5});
+  time.KeyframeSent({1}, {5});
+  time.Receive(Answer(0));
+  EXPECT_TRUE(time.HasDeltas({6})) << "nothing is waited for";
+  EXPECT_TRUE(time.TakeDeltas({6}).empty());
+  time.Receive(Answer(1));
+  EXPECT_EQ(time.TakeDeltas({7}).size(), 2U);
+  time.KeyframeSent({2}, {8});
+  time.Receive(Answer(2));
+  EXPECT_EQ(time.TakeDeltas({9}).size(), 1U);
+}
+
 TEST(LiveTime, AnAnswerServesTheNextFrameOnceAndOneQuestionIsOpenAtATime) {
   LiveTime time;
   EXPECT_TRUE(time.Ask({7}));

@@ -49,6 +49,19 @@ class RecordedStepsTest : public testing::Test {
   bool is_live_ = true;
 };
 
+TEST_F(RecordedStepsTest, TellsWhetherFramesOfTheLogDidNotReachTheTracker) {
+  WritePose(3, 0);
+  Write("END_OF_STREAM", EndOfStream{.stage = StageKind::kCamera, .num_frames = 9, .num_dropped = 4});
+  Write("END_OF_STREAM", EndOfStream{.stage = StageKind::kTracker, .num_frames = 9, .num_dropped = 5});
+  EXPECT_TRUE(Read().has_drops);
+}
+
+TEST_F(RecordedStepsTest, ACameraThatDroppedFramesLeavesNoneOfThemInTheLog) {
+  WritePose(3, 0);
+  Write("END_OF_STREAM", EndOfStream{.stage = StageKind::kCamera, .num_frames = 9, .num_dropped = 4});
+  EXPECT_FALSE(Read().has_drops);
+}
+
 TEST_F(RecordedStepsTest, KeepsTheStepOfEachFrameAndTheAnswersThatWereUsed) {
   WritePose(3, 0);
   WritePose(4, 2);

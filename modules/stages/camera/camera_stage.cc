@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "messages/tracking_types.h"
+#include "stages/camera/live_source.h"
 #include "stages/camera/log_source.h"
 
 namespace tessera {
@@ -22,8 +23,16 @@ std::unique_ptr<FrameSource> Open(const Settings& settings) {
   options.depth_unit_m = camera.depth_unit_m;
   options.first_frame = camera.first_frame;
   options.last_frame = camera.last_frame;
-  return options.source.starts_with("log:") ? OpenLog(options, settings.Get<BusSettings>().channel_prefix)
-                                            : OpenSource(options);
+  if (const bool is_device = options.source.starts_with("camera:"); is_device || options.source.starts_with("rtsp")) {
+    SourceOptions all = options;
+    all.first_frame = 0;
+    all.last_frame = -1;
+    return std::make_unique<LiveSource>([all] { return OpenSource(all); },
+                                        LiveSourceOptions{is_device, options.first_frame, options.last_frame});
+  }
+  return options.source.starts_with("log:")
+             ? OpenLog(options, settings.Get<BusSettings>().channel_prefix, settings.Get<TrackerSettings>().live)
+             : OpenSource(options);
 }
 
 CameraSessionOptions OptionsFrom(const Settings& settings) {
@@ -55,6 +64,7 @@ CameraStage::CameraStage(StageContext& context)
   context.Every(kTick, [] {});  // lets the idle task look at the clock
   context.Every(std::chrono::seconds(1), [this] {
     if (const auto report = session_.Watch(context_.now_us())) context_.ReportError(*report);
+    TellEvents();
   });
   context.SetValue("num_frames", static_cast<double>(session_.source().num_frames().value_or(0)));
   calibration_.Publish(session_.source().calibration());
@@ -66,6 +76,10 @@ CameraStage::~CameraStage() {
   } catch (const std::exception&) {
     // Nobody is left to tell; the dispatcher's own watch notices a stream without an end.
   }
+}
+
+void CameraStage::TellEvents() {
+  for (const std::string& event : session_.TakeEvents()) context_.ReportError(event);
 }
 
 // Returns whether to continue at once.

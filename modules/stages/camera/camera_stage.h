@@ -18,6 +18,7 @@ class CameraStage {
 
  private:
   bool Step();
+  void TellEvents();
   void Do(const CameraActions& actions);
 
   StageContext& context_;

@@ -13,7 +13,7 @@ constexpr size_t kMaxFramesBeforeCalibration = 16;
 
 class LogSource : public FrameSource {
  public:
-  LogSource(const SourceOptions& options, const std::string& channel_prefix);
+  LogSource(const SourceOptions& options, const std::string& channel_prefix, bool runs_live);
 
   const CameraCalibration& calibration() const override { return *calibration_; }
   std::optional<int64_t> num_frames() const override;
@@ -24,11 +24,12 @@ class LogSource : public FrameSource {
   const std::vector<std::string>& notes() const override { return notes_; }
 
  private:
-  // A live run is repeated as it went: what the dispatcher dropped then is not sent now.
+  // A run is repeated as it went: what the dispatcher dropped then is not sent now.
   bool IsWanted(FrameId frame) const {
     return frame.value >= options_.first_frame && (options_.last_frame < 0 || frame.value < options_.last_frame) &&
-           (!recorded_.is_live || recorded_.steps.contains(frame));
+           (!IsThinned() || recorded_.steps.contains(frame));
   }
+  bool IsThinned() const { return recorded_.is_live || recorded_.has_drops; }
   std::optional<CameraFrame> ReadFrame();
   void CheckOptions() const;
   void ReadUntilCalibrated();
@@ -43,11 +44,14 @@ class LogSource : public FrameSource {
   std::vector<std::string> notes_;
 };
 
-LogSource::LogSource(const SourceOptions& options, const std::string& channel_prefix)
+LogSource::LogSource(const SourceOptions& options, const std::string& channel_prefix, bool runs_live)
     : options_(options),
       reader_(options.source.substr(std::string("log:").size()), channel_prefix),
       recorded_(ReadRecordedSteps(options.source.substr(std::string("log:").size()), channel_prefix)) {
   CheckOptions();
+  if (runs_live && recorded_.is_live) {
+    throw InputError(options_.source + " was recorded live and is repeated as it went: leave out --live");
+  }
   ReadUntilCalibrated();
 }
 
@@ -93,7 +97,7 @@ void LogSource::Take(const CameraCalibration& recorded) {
 }
 
 std::optional<int64_t> LogSource::num_frames() const {
-  const bool is_whole = options_.first_frame == 0 && options_.last_frame < 0 && !recorded_.is_live;
+  const bool is_whole = options_.first_frame == 0 && options_.last_frame < 0 && !IsThinned();
   return is_whole ? std::optional(reader_.num_frames()) : std::nullopt;
 }
 
@@ -128,8 +132,8 @@ std::optional<CameraFrame> LogSource::Next() {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> OpenLog(const SourceOptions& options, const std::string& channel_prefix) {
-  return std::make_unique<LogSource>(options, channel_prefix);
+std::unique_ptr<FrameSource> OpenLog(const SourceOptions& options, const std::string& channel_prefix, bool runs_live) {
+  return std::make_unique<LogSource>(options, channel_prefix, runs_live);
 }
 
 }  // namespace tessera

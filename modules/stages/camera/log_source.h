@@ -10,7 +10,8 @@ namespace tessera {
 
 // Opens log:FILE; the log's channels have this prefix. Of a stereo or RGB-D log, mono takes the left images.
 // Throws InputError: see LogReader; wrong sensor; a calibration option (the recorded images are rectified
-// already); no frame of the wanted range.
-std::unique_ptr<FrameSource> OpenLog(const SourceOptions& options, const std::string& channel_prefix);
+// already); no frame of the wanted range; `runs_live`: a recording of a live run, which is only ever repeated.
+std::unique_ptr<FrameSource> OpenLog(const SourceOptions& options, const std::string& channel_prefix,
+                                     bool runs_live = false);
 
 }  // namespace tessera

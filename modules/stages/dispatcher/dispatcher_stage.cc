@@ -1,5 +1,6 @@
 #include "stages/dispatcher/dispatcher_stage.h"
 
+#include <cmath>
 #include <string>
 
 #include "features/tile_packing.h"
@@ -10,9 +11,13 @@ namespace {
 
 DispatcherOptions OptionsFrom(const StageContext& context) {
   const auto dispatcher = context.settings().Get<DispatcherSettings>();
+  const auto camera = context.settings().Get<CameraSettings>();
   const auto features = context.settings().Get<FeaturesSettings>();
   DispatcherOptions options{.epoch_us = context.epoch_us(),
-                            .max_kept_bytes = context.settings().Get<StreamTimingSettings>().history_bytes};
+                            .max_kept_bytes = context.settings().Get<StreamTimingSettings>().history_bytes,
+                            .newest_wins = dispatcher.newest_wins,
+                            .give_up_us = std::llround(1e6 * camera.give_up_s),
+                            .renumbers = dispatcher.newest_wins && camera.source.empty()};
   options.queue.grid = ParseTileGrid(dispatcher.tiles);
   options.queue.max_queued_frames = dispatcher.max_queued_frames;
   options.queue.max_frames_in_flight = dispatcher.max_frames_in_flight;
@@ -33,6 +38,8 @@ DispatcherStage::DispatcherStage(StageContext& context)
   context.Every(std::chrono::milliseconds(200), [this] {
     session_.Watch(context_.now_us());
     GiveWork();
+    context_.SetValue("silent_s", 1e-6 * static_cast<double>(session_.SilenceUs(context_.now_us())));
+    context_.SetValue("gave_up", session_.has_given_up() ? 1.0 : 0.0);
     context_.SetValue("extractors", session_.queue().num_extractors());
     context_.SetValue("jobs_given_again", static_cast<double>(session_.queue().num_given_again()));
   });

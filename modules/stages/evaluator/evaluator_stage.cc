@@ -1,5 +1,6 @@
 #include "stages/evaluator/evaluator_stage.h"
 
+#include <cmath>
 #include <exception>
 
 #include "core/errors.h"
@@ -11,6 +12,7 @@ namespace tessera {
 EvaluatorStage::EvaluatorStage(StageContext& context)
     : context_(context),
       out_dir_(context.settings().Get<EvaluatorSettings>().out_dir),
+      map_path_(context.settings().Get<EvaluatorSettings>().save_map),
       session_(context.name()),
       map_(
           context, !context.settings().Get<MapperSettings>().load_map.empty(),
@@ -38,6 +40,11 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
   });
   context.Subscribe(kStatus, [this](const StageStatus& status) { session_.Receive(status, context_.now_us()); });
   context.Every(std::chrono::milliseconds(50), [this] { FinishIfDone(); });
+  if (const double period_s = context.settings().Get<EvaluatorSettings>().save_period_s; period_s > 0.0) {
+    context.Every(std::chrono::milliseconds(std::llround(1e3 * period_s)), [this] {
+      if (!map_.needs_snapshot()) SaveMap();
+    });
+  }
 }
 
 EvaluatorStage::~EvaluatorStage() {
@@ -63,11 +70,17 @@ void EvaluatorStage::Write() {
   const RunRecord& record = session_.TakeRecord();
   if (out_dir_.empty()) return;
   WriteMapFile(record.map(), out_dir_ + "/map.tessera");
-  if (const auto path = context_.settings().Get<EvaluatorSettings>().save_map; !path.empty()) {
-    WriteMapFile(record.map(), path);
-  }
-  WriteRun(record, out_dir_);
+  SaveMap();
+  WriteRun(record, out_dir_, context_.settings().Get<BodySettings>().BaseFromCamera());
   context_.Info("wrote the run to " + out_dir_);
+}
+
+// Whole or not at all: a machine that is switched off meanwhile keeps the map that was saved before.
+void EvaluatorStage::SaveMap() {
+  const Map& map = session_.map();
+  if (map_path_.empty() || map.keyframes().size() == 0 || map.next_delta() == saved_delta_) return;
+  WriteMapFile(map, map_path_);
+  saved_delta_ = map.next_delta();
 }
 
 }  // namespace tessera

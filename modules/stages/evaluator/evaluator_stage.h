@@ -22,11 +22,14 @@ class EvaluatorStage {
  private:
   void FinishIfDone();
   void Write();
+  void SaveMap();
 
   StageContext& context_;
   const std::string out_dir_;
+  const std::string map_path_;  // empty: no copy of the map is kept
   EvaluatorSession session_;
   MapSubscription map_;
+  int64_t saved_delta_ = -1;  // next_delta() of the map that was last saved
 };
 
 }  // namespace tessera

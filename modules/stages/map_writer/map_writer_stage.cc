@@ -39,7 +39,7 @@ void MapWriterStage::WriteIfDone() {
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
   if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
   try {
-    WriteFile(path_, PlyText(replica_));
+    WriteFile(path_, PlyText(replica_, context_.settings().Get<BodySettings>().BaseFromCamera()));
   } catch (const InputError& error) {
     context_.Fail(error.what(), 2);
     return;

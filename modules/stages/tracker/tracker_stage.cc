@@ -1,5 +1,6 @@
 #include "stages/tracker/tracker_stage.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -13,6 +14,8 @@ namespace {
 constexpr std::chrono::milliseconds kAskAgain{500};
 
 bool BeginsWithMap(const Settings& settings) { return !settings.Get<MapperSettings>().load_map.empty(); }
+
+bool WatchesLatency(const TrackerSettings& tracker) { return tracker.live && tracker.replay_log.empty(); }
 
 MapTrackerOptions OptionsFrom(const TrackerSettings& settings) {
   MapTrackerOptions options;
@@ -42,7 +45,9 @@ TrackerStage::TrackerStage(StageContext& context)
       session_(MakeSession(context.settings())),
       map_(
           context, BeginsWithMap(context.settings()),
-          [this](const MapFollower::Delta& delta) { return session_.Receive(delta); }, [this] { Advance(); }) {
+          [this](const MapFollower::Delta& delta) { return session_.Receive(delta); }, [this] { Advance(); }),
+      base_from_camera_(context.settings().Get<BodySettings>().BaseFromCamera()),
+      watches_latency_(WatchesLatency(context.settings().Get<TrackerSettings>())) {
   poses_ = context.Advertise(kPose);
   keyframes_ = context.Advertise(kKeyframe);
   end_of_stream_ = context.Advertise(kEndOfStream);
@@ -97,7 +102,14 @@ void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
 
 void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {
   pose.map_wait_us = wait_.End(began_us);
+  const int64_t now_us = context_.wall_us();
+  pose.latency_us = std::max<int64_t>(0, now_us - pose.captured_us);
+  pose.body = StateOfBase(pose.body, base_from_camera_);
   poses_.Publish(pose);
+  if (watches_latency_) {
+    if (const auto sentence = latency_.Note(pose.frame, pose.captured_us, now_us)) context_.ReportError(*sentence);
+  }
+  context_.SetValue("latency_ms", 1e-3 * static_cast<double>(pose.latency_us));
   context_.SetValue("state", static_cast<double>(pose.state));
   context_.SetValue("scale_sigma", pose.scale_sigma);
   context_.SetValue("map_wait_s", 1e-6 * static_cast<double>(wait_.total_us()));

@@ -5,6 +5,7 @@
 #include "messages/end_of_stream.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
+#include "tracking/latency_watch.h"
 #include "tracking/map_wait.h"
 #include "tracking/tracker_session.h"
 
@@ -29,7 +30,10 @@ class TrackerStage {
   Publisher<KeyframeObservation> keyframes_;
   Publisher<RelocalizationRequest> requests_;
   Publisher<EndOfStream> end_of_stream_;
+  const Rigid3 base_from_camera_;
   MapWait wait_;
+  const bool watches_latency_;  // of a live run; others may be as late as they like
+  LatencyWatch latency_;
 };
 
 }  // namespace tessera

@@ -2,7 +2,7 @@
 
 import os
 
-from tessera_cli.cli.parsing import SENSORS, Parser, assignment, frames, pace, tiles, whole_number
+from tessera_cli.cli.parsing import SENSORS, Parser, assignment, frames, pace, seconds, tiles, whole_number
 from tessera_cli.constants import DEFAULT_PORT, MAX_FEATURES, MAX_INSTANCES
 
 SOURCES = """\
@@ -38,6 +38,10 @@ def add_settings(parser: Parser) -> None:
     )
 
 
+def add_force(parser: Parser, what: str) -> None:
+    parser.add_argument("--force", action="store_true", help=what)
+
+
 def add_port(parser: Parser) -> None:
     parser.add_argument(
         "--port",
@@ -45,6 +49,16 @@ def add_port(parser: Parser) -> None:
         metavar="N",
         default=DEFAULT_PORT,
         help=f"base port of the buses, for a second stack on one machine; default {DEFAULT_PORT}",
+    )
+
+
+def add_free_port(parser: Parser) -> None:
+    """Of commands that start a stack: None without the option."""
+    parser.add_argument(
+        "--port",
+        type=whole_number(1024, 65000),
+        metavar="N",
+        help=f"base port of the buses; default {DEFAULT_PORT}, or the next that is free, which is printed then",
     )
 
 
@@ -115,17 +129,34 @@ def add_run_options(parser: Parser) -> None:
         "--pace",
         type=pace,
         metavar="lockstep|realtime|X",
-        help="default lockstep for files, realtime for cameras; X is a speed factor",
+        help="default lockstep for files, realtime for cameras and --live; X is a speed factor; with bus:, lockstep "
+        "takes frames in their order instead of the newest",
     )
     parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-<source name>")
+    add_force(parser, "an earlier run in --out DIR may be replaced")
     parser.add_argument(
         "--live",
         action="store_true",
-        help="the tracker never waits for the mapper; a recording of such a run can be replayed exactly",
+        help="as with cameras, which always do so: the newest frame wins, a waiting one is dropped for it, and the "
+        "tracker never waits for the mapper; a file is read at its own pace; a recording can be replayed exactly",
+    )
+    parser.add_argument(
+        "--give-up",
+        type=seconds,
+        metavar="SECONDS",
+        default=0.0,
+        help="end the run when a camera or stream has sent nothing for so long; default: wait until it is back",
+    )
+    parser.add_argument(
+        "--axes",
+        choices=("ros", "camera"),
+        help="ros: poses of a body with x forward, y left, z up, placed by base_from_camera of the camera's file, or "
+        "where the camera is; camera: of the camera, x right, y down, z forward; default ros if the file has "
+        "base_from_camera, else camera",
     )
     _add_map_options(parser)
     parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
-    add_port(parser)
+    add_free_port(parser)
 
 
 def _add_map_options(parser: Parser) -> None:
@@ -134,6 +165,12 @@ def _add_map_options(parser: Parser) -> None:
         "--polish",
         action="store_true",
         help="adjust the whole map once more when the run ends, also without loops; trajectory_live.txt stays",
+    )
+    parser.add_argument(
+        "--map",
+        metavar="NAME",
+        help="a map that lasts: loaded if it exists, continued, saved every minute and at the end; NAME is a file "
+        "(.tessera), or a name under logs/maps",
     )
     parser.add_argument("--load-map", metavar="FILE", help="continue in the map of an earlier run: its map.tessera")
     parser.add_argument("--save-map", metavar="FILE", help="one more copy of the run's map.tessera")

@@ -52,6 +52,12 @@ def whole_number(minimum: int, maximum: int) -> Callable[[str], int]:
     return parse
 
 
+def seconds(text: str) -> float:
+    if not re.fullmatch(r"\d{1,6}(\.\d+)?", text) or float(text) <= 0:
+        raise argparse.ArgumentTypeError(f"must be a number of seconds above 0, not '{text}'")
+    return float(text)
+
+
 def tiles(text: str) -> str:
     """LINESxCOLUMNS without leading zeros."""
     if not re.fullmatch(r"0*[1-9]\d{0,2}x0*[1-9]\d{0,2}", text):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -152,7 +153,8 @@ class ExperimentRunner:
         frames: tuple[int, int],
         more: list[str],
     ) -> float:
-        """CPU seconds of the whole command."""
+        """CPU seconds of the whole command. What an interrupted run left in `path` goes."""
+        shutil.rmtree(path, ignore_errors=True)
         words = ["run", source, "--sensor", sequence.sensor, "--extractors", str(self._options.extractors)]
         words += ["--port", str(self._options.port), "--out", str(path), *more]
         if frames != (0, -1):

@@ -125,6 +125,7 @@ def _figures_of_all(results: list[Result]) -> list[tuple[str, list[str]]]:
         ("pose time, 95 %", of_times("pose_time_ms", "p95")),
         ("latency, median", of_times("latency_ms", "median")),
         ("latency, 95 %", of_times("latency_ms", "p95")),
+        ("latency, 99 %", of_times("latency_ms", "p99")),
         ("wait for the map, 95 %", of_times("map_wait_ms", "p95")),
         ("parts of the map", from_summary("map_parts")),
         ("keyframes in the map", from_summary("keyframes")),

@@ -33,6 +33,8 @@ def _tracked(result: Result) -> str:
     if "frames" not in summary:
         return ""
     frames, tracked, before = summary["frames"], summary["frames_tracked"], summary.get("frames_initializing") or 0
+    if tracked == 0:
+        return f"No pose was found for any of {frames:,} frames."
     if tracked == frames:
         return f"All {frames:,} frames were tracked."
     if tracked + before == frames:
@@ -86,7 +88,7 @@ def _drift(result: Result) -> str:
 
 def _failures(result: Result) -> str:
     failures = result.summary.get("tracking_failures")
-    if failures is None:
+    if failures is None or not result.summary.get("frames_tracked"):
         return ""
     if failures == 0:
         return "Tracking never failed."
@@ -105,8 +107,6 @@ def remarks(result: Result) -> list[str]:
         found.append("The run was interrupted before its source ended; all figures are of the frames until then.")
     elif ended != "complete":
         found.append(f"The run failed: {ended}")
-    if dropped := summary.get("frames_dropped"):
-        found.append(f"{count(dropped, 'frame')} never reached the tracker: they came too fast to be processed.")
     found += _lost(result) + _parts(summary)
     if (wait := summary.get("map_wait_ms")) and wait["p95"] >= NOTABLE_WAIT_MS:
         found.append(

@@ -11,7 +11,7 @@ from tessera_cli.runs.run_folder import Frames, Result
 RATE_BINS = (8, 60)
 TIMES = (
     ("pose_time_ms", "pose time [ms]", "from one pose to the next"),
-    ("latency_ms", "latency [ms]", "from a frame to its pose"),
+    ("latency_ms", "latency [ms]", "from the capture of a frame to its pose"),
     ("map_wait_ms", "wait for the map [ms]", "of the tracker"),
 )
 

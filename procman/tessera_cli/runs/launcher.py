@@ -3,13 +3,16 @@
 What the stack consists of, the order in which it starts and what is restarted is defined by procman/local.pmd.
 """
 
+import shutil
 import time
 from argparse import Namespace
 from pathlib import Path
 
 from tessera_cli.cluster.keys import key_folder
+from tessera_cli.console import say
 from tessera_cli.constants import (
     ADJUSTMENT_TIMEOUT_S,
+    DEFAULT_PORT,
     DRAIN_TIMEOUT_S,
     LISTEN_S,
     STALL_TIMEOUT_S,
@@ -20,7 +23,8 @@ from tessera_cli.files import PROCMAN
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
-from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run
+from tessera_cli.runs.ports import PortLock, take_free_port
+from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, require_no_run
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summary
@@ -41,10 +45,40 @@ def run_stack(arguments: Namespace, present: Present) -> int:
     """`arguments`: those of `tessera run`. Returns the exit status; `present` says what is printed at the end."""
     source = parse_source(arguments.source)
     folder = choose_folder(arguments.out, source)
-    logs = LogFolder(folder / "stages", f"another run writes into {folder}: give another --out DIR.")
-    remove_earlier_run(folder)
+    is_new = not folder.exists()
+    lock = _choose_port(arguments, source)
+    try:
+        return _run_in(folder, arguments, source, present)
+    except UserError:
+        if is_new:
+            _remove_unused(folder)
+        raise
+    finally:
+        del lock
+
+
+def _choose_port(arguments: Namespace, source: Source) -> PortLock | None:
+    """Without --port, the first that is free. What another program publishes on (bus:, a pool) it must be told."""
+    is_given = arguments.port is not None or any(text.startswith("bus.") for text in arguments.settings)
+    if is_given or not source.has_camera_process or arguments.extractors == 0:
+        arguments.port = arguments.port or DEFAULT_PORT
+        return None
+    arguments.port, lock = take_free_port(arguments.prefix)
+    if arguments.port != DEFAULT_PORT:
+        say(
+            f"another stack uses port {DEFAULT_PORT}; this run takes --port {arguments.port}, "
+            "which spy and map need to be given."
+        )
+    return lock
+
+
+def _run_in(folder: Path, arguments: Namespace, source: Source, present: Present) -> int:
     process_list = read_process_list(PROCESS_LIST, _counts(arguments, source))
     assignments = process_list.settings + run_assignments(arguments, source, folder)
+    logs = LogFolder(folder / "stages", f"another run writes into {folder}: give another --out DIR.")
+    if not arguments.force:
+        require_no_run(folder)
+    remove_earlier_run(folder)
     values = write_settings(assignments, folder / "settings.yaml")
     run_dir = _take_bus(arguments, source, values)
     try:
@@ -69,6 +103,12 @@ def _take_bus(arguments: Namespace, source: Source, values: Settings) -> RunDir 
     if run_dir:
         run_dir.make(pool_secret(key_folder()) if shares_extractors else draw_secret())
     return run_dir
+
+
+def _remove_unused(folder: Path) -> None:
+    """The folder of a run that never began: arguments or input were at fault, and the sentence says all."""
+    if not any((folder / name).exists() for name in ("run.json", "run.lcmlog")):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _counts(arguments: Namespace, source: Source) -> dict[str, int]:
@@ -124,7 +164,17 @@ class Launcher:
             self._deputy.kill()
         result = self._summarize(self._wall_s(began), ended)
         print(self._present(result, self._folder))
-        return 0 if result.summary["ended"] == "complete" or self._source.is_live else 1
+        if not result.summary["frames_tracked"]:
+            raise RunError(self._why_nothing_was_located(result.summary["frames"]))
+        # A live source has no end of its own: to interrupt it is the ordinary way.
+        said = result.summary["ended"]
+        return 0 if said == "complete" or (said == "interrupted" and self._source.is_live) else 1
+
+    def _why_nothing_was_located(self, num_frames: int) -> str:
+        said = f"no pose was found for any of {num_frames} frames"
+        if self._arguments.localize_only:
+            return f"{said}: is the map of this place, and of this camera?"
+        return f"{said}: is the camera moving, are its images sharp, and is its calibration right?"
 
     def _wall_s(self, began: float) -> float:
         """From the camera's start to the last pose."""
@@ -153,7 +203,7 @@ class Launcher:
         self._deputy.stop()
 
     def _watch(self, view: RunView) -> str:
-        """Until the evaluator has everything. Returns how the run ended: "complete" or "interrupted"."""
+        """Until the evaluator has everything. Returns how the run ended, as `RunFacts.ended` has it."""
         progress = self._monitor.progress
         while not progress.is_finished:
             self._look(view)
@@ -161,6 +211,8 @@ class Launcher:
             if self._interrupt.requested:
                 return self._drain(view)
             self._check_stall()
+        if progress.gave_up:
+            return f"the source sent no image for {self._arguments.give_up:g} s and was given up (--give-up)"
         return "complete"
 
     def _drain(self, view: RunView) -> str:

@@ -4,6 +4,7 @@ import sys
 import time
 from typing import Protocol, Self
 
+import numpy as np
 from rich import box
 from rich.console import Console, Group
 from rich.live import Live
@@ -16,9 +17,14 @@ from rich.text import Text
 
 from tessera_cli.console import say
 from tessera_cli.constants import LINE_PERIOD_S, MAX_EXTRACTORS_SHOWN, RUN_PANEL_PERIOD_S
+from tessera_cli.runs.dot_picture import dots_of, text_of
 from tessera_cli.supervision.progress import RUNNING, STAGE_STATES, Progress, StageReport, format_duration
 
-MAX_WIDTH = 80
+# Of the map from above, beside the processes where there is room.
+MAP_COLUMNS, MAP_LINES = 36, 10
+MIN_WIDTH_WITH_MAP = 112
+MIN_PATH_POINTS = 10
+STATE_STYLES = {"tracked": "bold green", "searching": "bold yellow", "lost": "bold red"}
 
 
 class RunView(Protocol):
@@ -78,9 +84,9 @@ class RunLines(_Context):
         self._last = time.monotonic()
         say(
             f"frame {progress.num_poses}{progress.of_all_frames}, {progress.frames_per_s:.1f}/s, "
-            f"{format_duration(progress.time_left_s)} left, {progress.tracking_state or 'no pose yet'}, "
+            f"{format_duration(progress.time_left_s)} left, {progress.state}, latency {progress.latency_text}, "
             f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, "
-            f"{progress.num_dropped} dropped"
+            f"dropped {progress.dropped_text}"
         )
 
 
@@ -124,7 +130,7 @@ class CounterBar:
 
 
 class RunPanel:
-    """Redrawn in place. Fits 80 columns."""
+    """Redrawn in place, as wide as the terminal; 80 columns are enough for all but the map."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -148,9 +154,12 @@ class RunPanel:
         self._live.update(self._draw(progress), refresh=True)
 
     def _draw(self, progress: Progress) -> Panel:
-        content = Group(_draw_bar(progress), Text(_tracking_line(progress)), _draw_stages(progress))
+        width = self._live.console.width
+        stages: Table = _draw_stages(progress)
+        if width >= MIN_WIDTH_WITH_MAP and len(progress.path) >= MIN_PATH_POINTS:
+            stages = _beside(stages, _draw_map(progress))
         title = Text(self._title, overflow="ellipsis")
-        return Panel(content, title=title, box=box.ROUNDED, width=min(MAX_WIDTH, self._live.console.width))
+        return Panel(Group(_draw_bar(progress), _draw_state(progress), stages), title=title, box=box.ROUNDED)
 
 
 def _draw_bar(progress: Progress) -> Table:
@@ -166,11 +175,31 @@ def _draw_bar(progress: Progress) -> Table:
     return row
 
 
-def _tracking_line(progress: Progress) -> str:
-    return (
-        f"tracking: {progress.tracking_state or 'no pose yet'}  keyframes: {progress.num_keyframes}  "
-        f"landmarks: {progress.num_landmarks}  loops: {progress.num_loops}  dropped: {progress.num_dropped}"
+def _draw_state(progress: Progress) -> Text:
+    """Two lines: what a controller asks, and what there is of a map."""
+    state = progress.state
+    text = Text(no_wrap=True, overflow="ellipsis")
+    text.append(state, style=STATE_STYLES.get(state, "bold red" if progress.silent_s > 0 else "bold"))
+    text.append(f"   latency {progress.latency_text}   dropped {progress.dropped_text}\n")
+    text.append(
+        f"{progress.num_keyframes:,} keyframes   {progress.num_landmarks:,} landmarks   "
+        f"{progress.num_loops:,} {'loop' if progress.num_loops == 1 else 'loops'}"
     )
+    return text
+
+
+def _beside(left: Table, right: Text) -> Table:
+    row = Table.grid(padding=(0, 2), expand=True)
+    row.add_column(ratio=1)
+    row.add_column(no_wrap=True)
+    row.add_row(left, right)
+    return row
+
+
+def _draw_map(progress: Progress) -> Text:
+    """The path so far from above, ahead is up."""
+    (picture,) = dots_of([np.array(progress.path)], MAP_COLUMNS, MAP_LINES)
+    return Text(text_of(picture), style="bright_blue")
 
 
 def _draw_stages(progress: Progress) -> Table:

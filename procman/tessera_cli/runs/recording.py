@@ -32,7 +32,7 @@ def record_source(arguments: Namespace) -> int:
     source = parse_source(arguments.source)
     if not source.has_camera_process:
         raise UserError(f"{arguments.source} is on the bus already: record it with .venv/bin/lcm-logger.")
-    log = _check_target(arguments.log)
+    log = _check_target(arguments.log, arguments.force)
     num_frames = record(arguments, source, log, keep_interrupted=True)
     say(f"{num_frames} frames, {log.stat().st_size / 1e6:.1f} MB in {log}")
     return 0
@@ -62,12 +62,14 @@ def _part(log: Path) -> Path:
     return log.with_name(f"{log.name}.part")
 
 
-def _check_target(text: str) -> Path:
+def _check_target(text: str, force: bool) -> Path:
     log = absolute(text)
     if not log.parent.is_dir():
         raise UserError(f"there is no folder {log.parent} to write {log.name} into.")
     if log.is_dir() or "?" in str(log):
         raise UserError(f"{log} can't be a log's name: give a file, without a question mark.")
+    if log.exists() and not force:
+        raise UserError(f"{log} is there already; name another file, or add --force to replace it.")
     return log
 
 

@@ -38,6 +38,15 @@ RUN_FILES = (
     "settings.yaml",
 )
 LOOP_COLUMNS = ("keyframe_timestamp_s", "matched_timestamp_s", "inliers", "scale")
+# How the sentences of source_watch.cc, live_source.cc and dispatcher_session.cc can be known.
+SOURCE_EVENTS = (
+    "no image for",
+    "images come again",
+    "the camera is connected",
+    "connection to the camera",
+    "the program that sends",
+)
+MAX_EVENTS = 50
 # Trajectory files keep microseconds.
 SAME_TIME_S = 1e-4
 
@@ -52,6 +61,12 @@ def new_folder(name: str) -> Path:
 def choose_folder(out: str | None, source: Source) -> Path:
     """Of --out, else under logs/."""
     return absolute(out) if out else new_folder(source.name)
+
+
+def require_no_run(folder: Path) -> None:
+    """Raises UserError if the folder holds an earlier run, which would be overwritten."""
+    if any((folder / name).exists() for name in RUN_FILES):
+        raise UserError(f"--out {folder}: it holds a run already; name another folder, or add --force to replace it.")
 
 
 def remove_earlier_run(folder: Path) -> None:
@@ -247,12 +262,30 @@ def read_loops(path: Path) -> list[Loop]:
         raise UserError(f"{path}: is no table of loops; its columns must be {columns}.") from error
 
 
+def read_source_events(folder: Path) -> list[str]:
+    """What happened to a live source, in order, each with its time of day: silence, broken and new connections."""
+    lines = []
+    for name in ("camera", "dispatcher"):
+        path = folder / f"{name}.log"
+        if path.is_file():
+            lines += [line for line in path.read_text(errors="replace").splitlines() if _is_source_event(line)]
+    events = [f"{line.split()[0]}: {line.split(': ', 1)[1]}." for line in sorted(lines)]
+    more = len(events) - MAX_EVENTS
+    return events if more <= 0 else [*events[:MAX_EVENTS], f"{more} more events of the source are in {folder}."]
+
+
+def _is_source_event(line: str) -> bool:
+    is_problem = " warning: " in line or " error: " in line
+    return is_problem and any(words in line for words in SOURCE_EVENTS)
+
+
 def read_log_warnings(folder: Path) -> list[str]:
     """For each process that logged warnings or errors: how many, and the first one."""
     found = []
     for path in sorted(folder.glob("*.log")):
         lines = path.read_text(errors="replace").splitlines()
         warnings = [line for line in lines if " warning: " in line or " error: " in line]
+        warnings = [line for line in warnings if not _is_source_event(line)]
         if warnings:
             first = warnings[0].split(": ", 1)[1]
             count = f"{len(warnings)} {'problem' if len(warnings) == 1 else 'problems'}"

@@ -11,11 +11,13 @@ import numpy as np
 from tessera_cli.constants import MAX_SCALE_SIGMA
 from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
-from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run
+from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run, read_source_events
 from tessera_cli.versions import collect_versions
 
 # Frames with doubtful steps that are no farther apart belong to one stretch.
 MAX_GAP_FRAMES = 30
+# A live pose that comes later was queued: one frame is extracted, one tracked, and one waits (latency_watch.h).
+MAX_LATENCY_INTERVALS = 3
 
 # Copied unchanged from the evaluator's run.json.
 EVALUATOR_KEYS = (
@@ -91,7 +93,11 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "messages_undecodable": facts.messages_undecodable,
         "messages_of_strangers": facts.messages_of_strangers,
         "extractor_restarts": processes.num_extractor_restarts,
-        "warnings": processes.warnings + scale_warnings(result.frames, facts.sensor),
+        "warnings": processes.warnings
+        + read_source_events(folder / "stages")
+        + drop_warnings(evaluated, result)
+        + latency_warnings(result)
+        + scale_warnings(result.frames, facts.sensor),
         "versions": collect_versions(),
     }
     write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
@@ -105,6 +111,41 @@ def judge_end(ended: str, evaluated: dict[str, Any]) -> str:
         return ended
     were = "frame is" if missing == 1 else "frames are"
     return f"incomplete: {missing} {were} not accounted for, of {evaluated['frames'] + missing} that the camera sent"
+def drop_warnings(evaluated: dict[str, Any], result: Result) -> list[str]:
+    """How many frames did not reach the tracker, and why; empty if all did."""
+    dropped, frames = evaluated["frames_dropped"], evaluated["frames"]
+    if not dropped:
+        return []
+    said = f"Dropped {dropped:,} of {frames:,} frames"
+    camera = result.settings.get("camera", {})
+    if camera.get("source", "").startswith("log:") and camera.get("pace") == "lockstep":
+        return [f"{said}: so did the run that the log recorded."]
+    seconds = _seconds_of_poses(result.frames)
+    if not seconds:
+        return [f"{said}: they came faster than the machine handles them."]
+    handled = (frames - dropped) / seconds
+    return [f"{said}: the machine handles {handled:.1f} frames a second of {frames / seconds:.1f}."]
+
+
+def latency_warnings(result: Result) -> list[str]:
+    """Of a live run whose poses came so late that frames must have waited."""
+    seconds = _seconds_of_poses(result.frames)
+    if result.frames is None or not seconds or not result.settings.get("dispatcher", {}).get("newest_wins"):
+        return []
+    numbers, latency_ms = result.frames.numbers, result.frames.latency_ms
+    limit_ms = MAX_LATENCY_INTERVALS * 1000 * seconds / max(1, int(numbers[-1] - numbers[0]))
+    late = latency_ms[latency_ms > limit_ms]
+    if len(late) == 0:
+        return []
+    return [
+        f"{len(late):,} of {len(latency_ms):,} poses came later than {MAX_LATENCY_INTERVALS} frame intervals "
+        f"({limit_ms:.0f} ms) after the frame was taken, the latest after {late.max():,.0f} ms."
+    ]
+
+
+def _seconds_of_poses(frames: Frames | None) -> float:
+    """From the first pose to the last, wall time; 0 if that is unknown."""
+    return float(np.nansum(frames.pose_time_ms)) / 1000 if frames is not None else 0.0
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:

@@ -43,5 +43,6 @@ class ListMonitor:
             return ""
         return (
             f"frame {progress.last_frame + 1}{progress.of_all_frames}, {progress.frames_per_s:.1f}/s, "
-            f"{format_duration(progress.time_left_s)} left, {progress.tracking_state}"
+            f"{format_duration(progress.time_left_s)} left, {progress.state}, "
+            f"latency {progress.latency_text}, dropped {progress.dropped_text}"
         )

@@ -1,7 +1,9 @@
 """What the bus has told about a run so far: the state of each stage, and how far the poses are."""
 
+import statistics
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tessera_cli.constants import FRAME_RATE_WINDOW_S, MAX_SCALE_SIGMA
@@ -11,6 +13,10 @@ STARTING, RUNNING = stage_status_t.STARTING, stage_status_t.RUNNING
 FINISHED, FAILED = stage_status_t.FINISHED, stage_status_t.FAILED
 STAGE_STATES = {STARTING: "starting", RUNNING: "running", FINISHED: "finished", FAILED: "failed"}
 TRACKING_STATES = {pose_t.INITIALIZING: "initializing", pose_t.TRACKED: "tracked", pose_t.LOST: "lost"}
+# Without a pose for less than this, the camera is looked for where it was (tracker.max_lost_s).
+SEARCH_S = 1.5
+# Of the path that is kept for a picture: when there are more points, every second one goes.
+MAX_PATH_POINTS = 1000
 
 
 @dataclass
@@ -73,6 +79,12 @@ def format_duration(seconds: float | None) -> str:
     return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
 
 
+def _state_of(pose: pose_t) -> str:
+    if pose.state == pose_t.LOST and 0 <= pose.since_tracked < 1e6 * SEARCH_S:
+        return "searching"
+    return TRACKING_STATES[pose.state]
+
+
 @dataclass
 class Progress:
     """Of one run."""
@@ -84,6 +96,9 @@ class Progress:
     started_at: float = field(default_factory=time.monotonic)
     last_pose_at: float | None = None  # monotonic seconds
     stages: dict[str, StageReport] = field(default_factory=dict)
+    path: list[tuple[float, float]] = field(default_factory=list)  # from above: right and ahead, units of the map
+    _path_step: int = 1  # poses from one of its points to the next
+    _recent_latency_ms: deque[tuple[float, float]] = field(default_factory=deque)  # (monotonic seconds, ms)
     _recent: deque[tuple[float, int]] = field(default_factory=deque)  # (monotonic seconds, number of poses)
 
     def add_report(self, report: StageReport) -> None:
@@ -95,13 +110,57 @@ class Progress:
         now = time.monotonic()
         self.num_poses += 1
         self.last_frame = max(self.last_frame, pose.frame)
-        self.tracking_state = TRACKING_STATES[pose.state]
+        self.tracking_state = _state_of(pose)
         if pose.state == pose_t.TRACKED and pose.scale_sigma > MAX_SCALE_SIGMA:
             self.tracking_state = "scale in doubt"
         self.last_pose_at = now
         self._recent.append((now, self.num_poses))
         while self._recent[0][0] < now - FRAME_RATE_WINDOW_S:
             self._recent.popleft()
+        self._recent_latency_ms.append((now, pose.latency / 1000))
+        while self._recent_latency_ms[0][0] < now - FRAME_RATE_WINDOW_S:
+            self._recent_latency_ms.popleft()
+        if pose.state == pose_t.TRACKED and self.num_poses % self._path_step == 0:
+            self._add_to_path(pose.world_from_camera.translation)
+
+    def _add_to_path(self, position: Sequence[float]) -> None:
+        self.path.append((position[0], position[2]))
+        if len(self.path) > MAX_PATH_POINTS:
+            self.path = self.path[::2]
+            self._path_step *= 2
+
+    @property
+    def state(self) -> str:
+        """Of tracking, unless there is nothing to track."""
+        if self.silent_s > 0:
+            return f"camera silent for {self.silent_s:.0f} s"
+        return self.tracking_state or "no pose yet"
+
+    @property
+    def silent_s(self) -> float:
+        """How long a live source has sent nothing; 0: it sends."""
+        return self._of_dispatcher("silent_s")
+
+    @property
+    def gave_up(self) -> bool:
+        return self._of_dispatcher("gave_up") > 0
+
+    def _of_dispatcher(self, name: str) -> float:
+        return self.stages["dispatcher"].values.get(name, 0.0) if "dispatcher" in self.stages else 0.0
+
+    @property
+    def latency_ms(self) -> float | None:
+        """From a frame's capture to its pose, the median of the last seconds."""
+        return statistics.median(ms for _, ms in self._recent_latency_ms) if self._recent_latency_ms else None
+
+    @property
+    def latency_text(self) -> str:
+        return f"{self.latency_ms:.0f} ms" if self.latency_ms is not None else "-"
+
+    @property
+    def dropped_text(self) -> str:
+        """ "3 of 200", or "0"."""
+        return f"{self.num_dropped} of {self.num_poses + self.num_dropped}" if self.num_dropped else "0"
 
     @property
     def frames_per_s(self) -> float:

@@ -1,9 +1,13 @@
-"""What the summary of a run says where the scale of the map is in doubt."""
+"""What the summary of a run warns of: doubts about the scale, frames that were dropped, poses that came late."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from tessera_cli.runs.run_folder import Frames
-from tessera_cli.runs.summary import judge_end, scale_warnings
+from tessera_cli.runs.run_folder import Frames, Result, read_log_warnings, read_source_events
+from tessera_cli.runs.summary import drop_warnings, judge_end, latency_warnings, scale_warnings
 
 
 def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None = None) -> Frames:
@@ -65,3 +69,62 @@ def test_complete_means_that_every_frame_is_accounted_for() -> None:
     )
     assert "40 frames are not" in judge_end("complete", {"frames": 20, "frames_missing": 40})
     assert judge_end("interrupted", {"frames": 20, "frames_missing": 40}) == "interrupted"
+def _live_result(latency_ms: np.ndarray, source: str = "kitti:/x", newest_wins: bool = True) -> Result:
+    """Poses of 161 of 200 frames of a camera at 10 Hz."""
+    numbers = np.linspace(0, 200, len(latency_ms)).astype(int)
+    frames = _frames(len(latency_ms), [])
+    pose_time_ms = np.concatenate([[np.nan], 100.0 * np.diff(numbers)])
+    settings: dict[str, dict[str, Any]] = {
+        "camera": {"source": source, "pace": "lockstep"},
+        "dispatcher": {"newest_wins": newest_wins},
+    }
+    return Result(
+        name="run",
+        estimate=None,
+        frames=replace(frames, latency_ms=latency_ms, pose_time_ms=pose_time_ms, numbers=numbers),
+        settings=settings,
+    )
+
+
+def test_dropped_frames_are_told_with_what_the_machine_handles() -> None:
+    result = _live_result(np.full(161, 50.0))
+    assert drop_warnings({"frames": 201, "frames_dropped": 0}, result) == []
+    (sentence,) = drop_warnings({"frames": 201, "frames_dropped": 40}, result)
+    assert sentence == "Dropped 40 of 201 frames: the machine handles 8.1 frames a second of 10.1."
+
+
+def test_a_replay_says_that_the_recorded_run_dropped_them() -> None:
+    (sentence,) = drop_warnings({"frames": 201, "frames_dropped": 40}, _live_result(np.full(161, 50.0), "log:/x"))
+    assert "recorded" in sentence and "handles" not in sentence
+
+
+def test_late_poses_of_a_live_run_are_told() -> None:
+    latency_ms = np.full(161, 50.0)
+    assert latency_warnings(_live_result(latency_ms)) == []
+    latency_ms[100:103] = [301.0, 950.0, 400.0]
+    (sentence,) = latency_warnings(_live_result(latency_ms))
+    assert sentence.startswith("3 of 161 poses came later than 3 frame intervals (300 ms)")
+    assert "950 ms" in sentence
+    assert latency_warnings(_live_result(latency_ms, newest_wins=False)) == []
+
+
+def test_every_event_of_a_live_source_is_told_in_order(tmp_path: Path) -> None:
+    (tmp_path / "camera.log").write_text(
+        "20:00:09.000 camera warning: the connection to the camera broke off (it ended); it is opened again\n"
+        "20:00:13.500 camera warning: the camera is connected again\n"
+        "20:00:14.000 camera warning: the disk is slow\n"
+    )
+    (tmp_path / "dispatcher.log").write_text(
+        "20:00:00.000 dispatcher info: tessera-dispatcher 1.0.0\n"
+        "20:00:11.000 dispatcher warning: no image for 2.0 s: the run waits for the source\n"
+        "20:00:13.700 dispatcher warning: images come again, after 4.7 s of silence\n"
+    )
+    events = read_source_events(tmp_path)
+    assert [event.split()[0] for event in events] == [
+        "20:00:09.000:",
+        "20:00:11.000:",
+        "20:00:13.500:",
+        "20:00:13.700:",
+    ]
+    assert events[-1] == "20:00:13.700: images come again, after 4.7 s of silence."
+    assert read_log_warnings(tmp_path) == ["camera reported 1 problem, the first: the disk is slow"]

@@ -7,7 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tessera_cli.cli.options import add_port
+from tessera_cli.cli.options import add_force, add_free_port
 from tessera_cli.cli.parsing import Commands, add_command, whole_number
 from tessera_cli.console import say
 from tessera_cli.errors import UserError
@@ -43,7 +43,8 @@ def add_parser(commands: Commands) -> None:
         "--logs", metavar="DIR", help="where the rendered drive is kept and the run's folder is made, default logs/"
     )
     parser.add_argument("--out", metavar="DIR", help="the run's folder, default logs/<date-time>-demo")
-    add_port(parser)
+    add_force(parser, "an earlier run in --out DIR may be replaced")
+    add_free_port(parser)
 
 
 def main(arguments: Namespace) -> int:
@@ -60,7 +61,8 @@ def main(arguments: Namespace) -> int:
     else:
         _render(log, arguments.frames)
     out = arguments.out or folder / new_folder("demo").name
-    options = ["--sensor", SENSOR, "--extractors", "2", "--tiles", "2x2", "--port", str(arguments.port)]
+    options = ["--sensor", SENSOR, "--extractors", "2", "--tiles", "2x2", *(["--force"] if arguments.force else [])]
+    options += ["--port", str(arguments.port)] if arguments.port else []
     return run_stack(parse_arguments(["run", f"log:{log}", *options, "--out", str(out)]), _present)
 
 

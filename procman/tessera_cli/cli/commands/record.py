@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 
-from tessera_cli.cli.options import SOURCES, add_source_options
+from tessera_cli.cli.options import SOURCES, add_force, add_source_options
 from tessera_cli.cli.parsing import Commands, add_command
 
 
@@ -16,6 +16,7 @@ def add_parser(commands: Commands) -> None:
     )
     parser.add_argument("source", metavar="SOURCE", help="see below")
     parser.add_argument("log", metavar="LOG", help="the file to write")
+    add_force(parser, "LOG may be replaced")
     add_source_options(parser)
 
 

@@ -1,0 +1,59 @@
+"""Which base port a run takes, so that a second one on the same machine does not disturb the first."""
+
+import socket
+from collections.abc import Iterator
+
+from tessera_cli.constants import DEFAULT_PORT, FREE_BUS_S, HEARTBEAT
+from tessera_cli.errors import RunError
+from tessera_cli.lcm_bus import Bus, bus_url, listen
+
+# From one stack's ports to the next: its buses, and a port for each extractor that there may be.
+STEP = 300
+
+NUM_TRIED = 20
+
+
+class PortLock:
+    """Held by a run as long as it lives; the kernel frees it, however the run ends.
+
+    An address without a file, which only processes of this machine (and network namespace) see, as the bus itself.
+    """
+
+    def __init__(self, port: int, channel_prefix: str) -> None:
+        """Raises OSError if another run holds it."""
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(f"\0tessera-run-{port}-{channel_prefix}")
+        except OSError:
+            self._socket.close()
+            raise
+
+
+def take_free_port(channel_prefix: str) -> tuple[int, PortLock]:
+    """The first base port whose bus nobody uses with this prefix, locked. Raises RunError if there is none."""
+    for port in _candidates():
+        try:
+            lock = PortLock(port, channel_prefix)
+        except OSError:
+            continue
+        if _is_silent(port, channel_prefix):
+            return port, lock
+    raise RunError(
+        f"the base ports {DEFAULT_PORT} to {DEFAULT_PORT + STEP * (NUM_TRIED - 1)} are in use: give --port N."
+    )
+
+
+def _candidates() -> Iterator[int]:
+    return (DEFAULT_PORT + STEP * number for number in range(NUM_TRIED))
+
+
+def _is_silent(port: int, channel_prefix: str) -> bool:
+    """Every stage sends ten heartbeats a second. A port that another program holds for itself is not silent."""
+    heard: list[bytes] = []
+    try:
+        bus = Bus(bus_url(port), "port_finder")
+        bus.subscribe(channel_prefix + HEARTBEAT, None, heard.append)
+    except RunError:
+        return False
+    listen([bus], FREE_BUS_S)
+    return not heard
