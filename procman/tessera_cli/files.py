@@ -1,6 +1,7 @@
-"""The folders of this checkout, and files that are written whole or not at all."""
+"""The folders of this checkout, its Python, and files that are written whole or not at all."""
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,14 @@ PROCMAN = ROOT / "procman"
 # TESSERA_BUILD: another build of the same sources, for developers.
 BUILD = Path(os.environ.get("TESSERA_BUILD", ROOT / "build"))
 BIN = BUILD / "bin"
+
+
+def python_command(module: str) -> list[str]:
+    """Runs a module in another process, with `PYTHONPATH`: the folder that holds tessera_cli.
+
+    -P: modules are not looked for in the working folder, which may be anybody's. UTF-8 whatever the locale.
+    """
+    return [sys.executable, "-P", "-X", "utf8", "-m", module]
 
 
 def unfinished(path: Path) -> Path:

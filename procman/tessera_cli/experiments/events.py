@@ -1,6 +1,6 @@
 """When each process published what, read from the log of a run that was recorded (tessera run --record).
 
-    python -m tessera_cli.experiments.events LOG EVENTS.csv
+    python -P -m tessera_cli.experiments.events LOG EVENTS.csv
 
 is a process of its own, since messages must be decoded with the types of the build that made them: TESSERA_BUILD.
 Events are small, where the log holds every image; so it can be removed afterwards.
