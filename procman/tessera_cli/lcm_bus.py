@@ -12,7 +12,7 @@ import lcm
 
 from tessera_cli.constants import MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
 from tessera_cli.errors import RunError
-from tessera_cli.messages import decode, header_t
+from tessera_cli.messages import header_t, receive
 
 
 def bus_url(port: int, time_to_live: int = 0) -> str:
@@ -51,7 +51,7 @@ class Bus:
         """
 
         def on_message(_channel: str, data: bytes) -> None:
-            message = data if message_type is None else decode(message_type, data)
+            message = data if message_type is None else receive(message_type, data)
             if message is not None:
                 handler(message)
 

@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 from tessera_cli.files import BUILD
+from tessera_cli.text import visible, visible_lines
 
 sys.path.insert(0, str(BUILD / "lcmtypes" / "python"))
 
@@ -27,7 +28,6 @@ from tessera import (
 __all__ = [
     "camera_image_t",
     "decode",
-    "decode_as",
     "end_of_stream_t",
     "header_t",
     "heartbeat_t",
@@ -38,6 +38,8 @@ __all__ = [
     "procman_process_t",
     "procman_status_t",
     "procman_wish_t",
+    "receive",
+    "receive_as",
     "stage_status_t",
 ]
 
@@ -53,7 +55,31 @@ def decode(message_type: Any, data: bytes) -> Any | None:
         return None
 
 
-def decode_as(type_name: str, data: bytes) -> Any | None:
-    """As `decode`, of the type of this name; None also if the build, of another commit, has no such type."""
+def receive(message_type: Any, data: bytes) -> Any | None:
+    """As `decode`; what others wrote into its texts may be printed."""
+    message = decode(message_type, data)
+    if message is not None:
+        _make_visible(message)
+    return message
+
+
+def receive_as(type_name: str, data: bytes) -> Any | None:
+    """As `receive`, of the type of this name; None also if the build, of another commit, has no such type."""
     message_type = getattr(importlib.import_module("tessera"), type_name, None)
-    return decode(message_type, data) if message_type else None
+    return receive(message_type, data) if message_type else None
+
+
+def _make_visible(message: Any) -> None:
+    """All texts of the message and of the messages in it; only output of processes has lines."""
+    for name in message.__slots__:
+        value = getattr(message, name)
+        if isinstance(value, str):
+            has_lines = isinstance(message, procman_output_t) and name == "text"
+            setattr(message, name, visible_lines(value) if has_lines else visible(value))
+        elif isinstance(value, list) and value and isinstance(value[0], str):
+            setattr(message, name, [visible(text) for text in value])
+        else:
+            for part in value if isinstance(value, list) else [value]:
+                if not hasattr(part, "__slots__"):
+                    break
+                _make_visible(part)

@@ -60,7 +60,7 @@ def read_log(path: Path) -> list[Event]:
     events = []
     for channel, data in lcm_bus.log_events(path):
         reader = READERS.get("TILE" if is_job(channel) else channel)
-        message = messages.decode_as(reader[0], data) if reader else None
+        message = messages.receive_as(reader[0], data) if reader else None
         if reader and message is not None and message.header.part == 0:
             header = message.header
             events.append(Event(channel, header.publisher, header.utime, *reader[1](message)))

@@ -12,6 +12,7 @@ from tessera_cli.constants import MAX_SCALE_SIGMA
 from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
 from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run
+from tessera_cli.text import visible_values
 from tessera_cli.versions import collect_versions
 
 # Frames with doubtful steps that are no farther apart belong to one stretch.
@@ -143,7 +144,7 @@ def _open_scale(frames: Frames, stretch: list[int]) -> str:
 
 def _read_evaluation(folder: Path) -> dict[str, Any]:
     try:
-        return json.loads((folder / "run.json").read_text())
+        return visible_values(json.loads((folder / "run.json").read_text()))
     except (OSError, ValueError) as error:
         log = folder / "stages" / "evaluator.log"
         raise RunError(f"the evaluator left no results in {folder}; {log} may say why.") from error
