@@ -43,6 +43,20 @@ def write_text(path: Path, text: str) -> None:
         written.write_text(text)
 
 
+def write_private(path: Path, data: bytes) -> None:
+    """Writes `path` whole or not at all. Nobody else can read or change it."""
+    with replacing(path) as written:
+        written.unlink(missing_ok=True)
+        with os.fdopen(os.open(written, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(data)
+
+
+def changed_by_others(path: Path) -> bool:
+    """Whether other users (except root) can change this file or folder."""
+    status = path.stat()
+    return status.st_uid not in (os.geteuid(), 0) or bool(status.st_mode & 0o022)
+
+
 def absolute(text: str) -> Path:
     """A path as typed by a user, absolute and with ~ replaced."""
     return Path(text).expanduser().absolute()

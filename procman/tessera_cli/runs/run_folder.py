@@ -6,6 +6,7 @@ Positions of `Result.estimate` are in the estimate's own world; `Result.in_truth
 import csv
 import datetime
 import json
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -200,7 +201,10 @@ def _read_summary(path: Path) -> Summary:
 
 
 def read_settings(path: Path) -> Settings:
-    return visible_values(yaml.safe_load(path.read_text()) or {}) if path.is_file() else {}
+    """None if there is no such file, or if it is another user's, since only its owner can read it."""
+    if not os.access(path, os.R_OK):
+        return {}
+    return visible_values(yaml.safe_load(path.read_text()) or {})
 
 
 def _read_rows(path: Path) -> list[dict[str, str]]:

@@ -12,6 +12,7 @@ from tessera_cli.constants import MAX_SCALE_SIGMA
 from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
 from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run
+from tessera_cli.settings import without_password
 from tessera_cli.text import visible_values
 from tessera_cli.versions import collect_versions
 
@@ -75,7 +76,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
     evaluated = _read_evaluation(folder)
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
     summary: Summary = {
-        "source": facts.source,
+        "source": without_password(facts.source),
         "sensor": facts.sensor,
         "extractors": facts.extractors,
         "tiles": facts.tiles,

@@ -38,6 +38,8 @@ from tessera_cli.supervision.running_list import RunningList, listen_to
 from tessera_cli.supervision.state_folder import StateFolder
 from tessera_cli.supervision.supervisor import Supervisor
 from tessera_cli.supervision.wishes import run_of, to_launch
+from tessera_cli.supervision.write_limits import refuse_writing_elsewhere
+from tessera_cli.text import visible
 from tessera_cli.versions import tessera_version
 
 
@@ -158,8 +160,8 @@ class Deputy:
             if order.action == procman_order_t.RUN and order.wishes:
                 self._folder.keep_order(order.list, data)
         except (UserError, RunError, OSError) as error:
-            self._last_refusal = str(error)
-            say(f"order refused: {error}")
+            self._last_refusal = visible(str(error))
+            say(f"order refused: {self._last_refusal}")
         self._publish_status()
 
     def _resume(self) -> None:
@@ -172,7 +174,7 @@ class Deputy:
             try:
                 self._obey(order)
             except (UserError, RunError, OSError) as error:
-                say(f"order refused: {error}")
+                say(visible(f"order refused: {error}"))
 
     def _obey(self, order: procman_order_t) -> None:
         if order.action == procman_order_t.RUN:
@@ -218,6 +220,7 @@ class Deputy:
 
     def _begin(self, list_name: str, run: str, assignments: list[str]) -> None:
         merged = settings.write_settings(assignments, self._folder.settings_path(run))
+        refuse_writing_elsewhere(merged, [path for command in self._commands.values() for path in command.writes])
         self._lists[list_name] = listen_to(list_name, run, merged, f"deputy_{self._id}", self._on_stage)
         self._supervisor.forget_remote_states(full_name(list_name, ""))
         self._folder.keep_settings({each.run for each in self._lists.values()})
