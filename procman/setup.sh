@@ -211,7 +211,10 @@ build() {
 # prepare ask|tell: everything but the build. Two commands at once must not build into each other: the lock is held until
 # the command calls `finish_setup`.
 prepare() {
-  mkdir -p "$root/logs"
+  mkdir -p "$root/logs" 2>/dev/null || true
+  if ! { : >>"$root/logs/.setup.lock"; } 2>/dev/null; then
+    fail "this checkout belongs to $(stat -c %U "$root"), and $(id -un) can't write into $root/logs: use a checkout of your own."
+  fi
   exec 9>"$root/logs/.setup.lock"
   flock -n 9 || { say "Waiting for another tessera command that is setting up"; flock 9; }
   : >"$setup_log"

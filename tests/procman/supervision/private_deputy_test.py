@@ -246,9 +246,9 @@ def test_no_other_user_can_keep_a_folder_from_its_owner() -> None:
     with tempfile.TemporaryDirectory() as top:
         Path(top).chmod(0o755)
         folder = Path(top) / "logs"
-        take = [sys.executable, "-c", TAKES_FOLDER, folder]
+        take = [sys.executable, "-c", TAKES_FOLDER, str(folder)]
         subprocess.run(take, env=environment(), check=True)
-        words = ["/usr/bin/python3", "-I", "-c", OTHER_USER, folder]
+        words = ["/usr/bin/python3", "-I", "-c", OTHER_USER, str(folder)]
         with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
             assert read_line(other) == "holds logs\n"
             assert read_line(other) == "Permission denied\n"
