@@ -81,7 +81,7 @@ def test_a_checkout_of_root(as_nobody: list[str]) -> None:
     with tempfile.TemporaryDirectory() as top:
         Path(top).chmod(0o755)
         shutil.copytree(ROOT / "procman", Path(top) / "procman")
-        words = [*as_nobody, Path(top) / "procman" / "tessera", "keys"]
+        words = [*as_nobody, f"{top}/procman/tessera", "keys"]
         finished = subprocess.run(words, capture_output=True, text=True)
         assert not (Path(top) / "logs" / ".setup.lock").exists()
     must_be_a_sentence(finished, "belongs to root", "can't write into", "use a checkout of your own")
@@ -91,6 +91,6 @@ def test_a_folder_of_another_user(as_nobody: list[str]) -> None:
     with tempfile.TemporaryDirectory() as top:
         (Path(top) / "run").mkdir(mode=0o700)
         Path(top).chmod(0o755)
-        words = [*as_nobody, *python_command("tessera_cli"), "evaluate", Path(top) / "run"]
+        words = [*as_nobody, *python_command("tessera_cli"), "evaluate", f"{top}/run"]
         finished = subprocess.run(words, env=environment(), capture_output=True, text=True)
     must_be_a_sentence(finished, "Permission denied")
