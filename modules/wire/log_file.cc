@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <system_error>
 
 #include "core/errors.h"
 
@@ -88,6 +89,21 @@ LogFileWriter::~LogFileWriter() {
   if (file_ == nullptr) return;
   std::fclose(file_);
   std::remove((path_ + ".part").c_str());
+}
+
+void LogFileWriter::Abandon(int64_t room_bytes) {
+  if (file_ == nullptr) return;
+  std::fclose(file_);
+  file_ = nullptr;
+  const std::string part = path_ + ".part";
+  std::error_code error;
+  const auto size = static_cast<int64_t>(std::filesystem::file_size(part, error));
+  if (error) return;
+  if (size > room_bytes) {
+    std::filesystem::resize_file(part, static_cast<uintmax_t>(size - room_bytes), error);
+  } else {
+    std::filesystem::remove(part, error);
+  }
 }
 
 void LogFileWriter::Write(int64_t time_us, const std::string& channel, ByteView data) {

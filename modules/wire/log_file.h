@@ -53,6 +53,9 @@ class LogFileWriter {
   // Throws InputError if the disk is full.
   void Write(int64_t time_us, const std::string& channel, ByteView data);
   void Close();
+  // After a failure: what is written stays as PATH.part, except its last `room_bytes`, which are given back to the
+  // disk. Nothing is written from then on.
+  void Abandon(int64_t room_bytes);
 
   int64_t num_events() const { return num_events_; }
   int64_t num_bytes() const { return num_bytes_; }

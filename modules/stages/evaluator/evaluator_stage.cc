@@ -52,7 +52,7 @@ void EvaluatorStage::FinishIfDone() {
   try {
     Write();
   } catch (const InputError& error) {
-    return context_.Fail(error.what(), 2);
+    return context_.Fail(error.what(), 1);  // the input was good, but the disk is full, say
   }
   context_.Finish();
 }
@@ -60,11 +60,12 @@ void EvaluatorStage::FinishIfDone() {
 void EvaluatorStage::Write() {
   const RunRecord& record = session_.TakeRecord();
   if (out_dir_.empty()) return;
-  WriteMapFile(record.map(), out_dir_ + "/map.tessera");
+  const auto write_map = [&](const std::string& path) { WriteMapFile(record.map(), path); };
+  std::vector<RunFile> maps = {{out_dir_ + "/map.tessera", write_map}};
   if (const auto path = context_.settings().Get<EvaluatorSettings>().save_map; !path.empty()) {
-    WriteMapFile(record.map(), path);
+    maps.push_back({path, write_map});
   }
-  WriteRun(record, out_dir_);
+  for (const std::string& sentence : WriteRun(record, out_dir_, maps)) context_.ReportError(sentence);
   context_.Info("wrote the run to " + out_dir_);
 }
 
