@@ -98,8 +98,9 @@ class Launcher:
             raise
         finally:
             self._deputy.kill()
-        print(self._present(self._summarize(self._wall_s(began), ended), self._folder))
-        return 0 if ended == "complete" or self._source.is_live else 1
+        result = self._summarize(self._wall_s(began), ended)
+        print(self._present(result, self._folder))
+        return 0 if (ended == "complete" or self._source.is_live) and not result.summary["not_written"] else 1
 
     def _wall_s(self, began: float) -> float:
         """From the camera's start to the last pose."""
@@ -187,6 +188,7 @@ class Launcher:
             wall_s=wall_s,
             ended=ended,
             messages_undecodable=sum(report.undecodable for report in reports),
+            not_written=self._missing_recording(),
         )
         process_facts = ProcessFacts(
             cpu_s={process.name: process.cpu_s for process in processes},
@@ -195,6 +197,13 @@ class Launcher:
             warnings=self._deputy.warnings,
         )
         return write_summary(self._folder, run_facts, process_facts)
+
+    def _missing_recording(self) -> tuple[str, ...]:
+        """A sentence if the run was to be recorded and the log is not whole."""
+        if not self._arguments.record or (self._folder / "run.lcmlog").is_file():
+            return ()
+        report = self._monitor.progress.stages.get("recorder")
+        return ("the recording is not whole" + (f": {report.last_error}" if report and report.last_error else ""),)
 
     def _try_to_summarize(self, wall_s: float, sentence: str) -> None:
         """After a failure: of what there is, if there is anything."""

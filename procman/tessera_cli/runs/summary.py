@@ -1,7 +1,8 @@
 """summary.json of a run, from what the evaluator wrote and what its processes used."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,7 @@ class RunFacts:
     wall_s: float  # from the camera's start to the last pose
     ended: str  # "complete", "interrupted", or the sentence of a failure
     messages_undecodable: int
+    not_written: tuple[str, ...] = ()  # sentences about files that only the command knows of
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,12 @@ class ProcessFacts:
 
 
 def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Result:
-    """Writes summary.json and returns the run with it. Raises RunError if the evaluator wrote nothing."""
+    """Writes summary.json and returns the run with it. Raises RunError if the evaluator wrote nothing.
+
+    A summary that can't be written is returned all the same, with a sentence in `not_written`, as for all other files.
+    """
     evaluated = _read_evaluation(folder)
+    not_written = [*evaluated.get("not_written", []), *facts.not_written]
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
     summary: Summary = {
         "source": without_password(facts.source),
@@ -91,10 +97,21 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "messages_undecodable": facts.messages_undecodable,
         "extractor_restarts": processes.num_extractor_restarts,
         "warnings": processes.warnings + scale_warnings(result.frames, facts.sensor),
+        "not_written": not_written,
         "versions": collect_versions(),
     }
-    write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
+    with noting_if_not_written(summary, "summary.json"):
+        write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     return replace(result, summary=summary)
+
+
+@contextmanager
+def noting_if_not_written(summary: Summary, name: str) -> Iterator[None]:
+    """Within it, the file of this name is written; if the system refuses that, `not_written` gets a sentence."""
+    try:
+        yield
+    except OSError as error:
+        summary["not_written"].append(f"{name} can't be written: {error.strerror or error}")
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
