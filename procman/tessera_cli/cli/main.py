@@ -49,7 +49,7 @@ def parse_arguments(arguments: list[str]) -> Namespace:
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:
         command.add_parser(commands)
-    return parser.parse_args(arguments)
+    return parser.parse_args(log.join_tool(arguments))
 
 
 def main() -> int:

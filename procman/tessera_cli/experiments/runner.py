@@ -24,7 +24,7 @@ EVENTS = "events.csv"
 # Of a recorded run: enough for a map that has settled, and not too much for a disk.
 RECORDED_FRAMES = 240
 # The map of a run may have a hundred megabytes, and its hash is in the summary.
-NOT_KEPT = ("map.tessera", "map.ply", "run.lcmlog")
+NOT_KEPT = ("map.tessera", "map.ply", "run.lcmlog", "run.lcmlog.checksums")
 
 
 @dataclass(frozen=True)

@@ -194,9 +194,14 @@ class Launcher:
             cpu_s={process.name: process.cpu_s for process in processes},
             max_rss_mb={process.name: process.max_rss_mb for process in processes},
             num_extractor_restarts=self._deputy.num_restarts("extractor"),
-            warnings=self._deputy.warnings,
+            warnings=self._deputy.warnings + self._missing_frames(),
         )
         return write_summary(self._folder, run_facts, process_facts)
+
+    def _missing_frames(self) -> list[str]:
+        """What the camera says of a log that lacks messages."""
+        report = self._monitor.progress.stages.get("camera")
+        return [report.last_error] if report and self._source.kind == "log" and report.last_error else []
 
     def _missing_recording(self) -> tuple[str, ...]:
         """A sentence if the run was to be recorded and the log is not whole."""

@@ -37,6 +37,7 @@ RUN_FILES = (
     "frames.csv",
     "loops.csv",
     "run.lcmlog",
+    "run.lcmlog.checksums",
     "settings.yaml",
 )
 LOOP_COLUMNS = ("keyframe_timestamp_s", "matched_timestamp_s", "inliers", "scale")
