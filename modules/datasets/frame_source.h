@@ -42,6 +42,8 @@ class FrameSource {
   virtual bool is_live() const = 0;
   // Notes for the user about how the source was read, one sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
+  // What is missing from the source, in one sentence; empty: nothing.
+  virtual std::string loss() const { return ""; }
 };
 
 // "mono", "stereo" or "rgbd". Throws InputError.

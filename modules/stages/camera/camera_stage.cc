@@ -47,6 +47,7 @@ CameraStage::CameraStage(StageContext& context)
       frames_(context.Advertise(kCamera)),
       end_of_stream_(context.Advertise(kEndOfStream)) {
   for (const std::string& note : session_.source().notes()) context.Info(note);
+  if (const std::string loss = session_.source().loss(); !loss.empty()) context.ReportError(loss);
   context.Subscribe(
       kPose, [this](const PoseEstimate& pose) { session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us()); });
   context.WhenIdle([this] { return Step(); });

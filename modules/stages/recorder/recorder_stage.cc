@@ -21,7 +21,8 @@ std::string PathFrom(const Settings& settings) {
 
 }  // namespace
 
-RecorderStage::RecorderStage(StageContext& context) : context_(context), log_(PathFrom(context.settings())) {
+RecorderStage::RecorderStage(StageContext& context)
+    : context_(context), log_(PathFrom(context.settings()), Checksums::kBeside) {
   context.SubscribeAll([this](const std::string& channel, ByteView message, int64_t arrival_us) {
     Write(channel, message, arrival_us);
   });
