@@ -17,6 +17,7 @@ MAX_MESSAGES_PER_TURN = 200
 
 # --- Channels (lcmtypes/README.md) --------------------------------------------------------------------------------
 STATUS, POSE, HEARTBEAT, CAMERA, END_OF_STREAM = "STATUS", "POSE", "HEARTBEAT", "CAMERA", "END_OF_STREAM"
+REPAIR = "REPAIR"
 PROCMAN_ORDER, PROCMAN_STATUS, PROCMAN_OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
 
 # --- Limits -------------------------------------------------------------------------------------------------------

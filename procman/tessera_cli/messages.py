@@ -24,6 +24,7 @@ from tessera import (
     procman_process_t,
     procman_status_t,
     procman_wish_t,
+    repair_request_t,
     stage_status_t,
 )
 
@@ -42,6 +43,7 @@ __all__ = [
     "procman_wish_t",
     "receive",
     "receive_as",
+    "repair_request_t",
     "stage_status_t",
 ]
 

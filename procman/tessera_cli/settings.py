@@ -42,8 +42,10 @@ def channel_prefix_of(assignments: list[str]) -> str:
     return values[-1] if values else ""
 
 
-def write_settings(assignments: list[str], path: Path) -> Settings:
+def write_settings(assignments: list[str], path: Path, base: Path | None = None) -> Settings:
     """Writes all settings to `path` and returns them. Raises UserError with the sentence of tessera-settings.
+
+    `base`: a file of settings that differ from the defaults; the assignments are stronger.
 
     Nobody else can read the file: the address of a camera may hold a password.
     """
@@ -53,6 +55,8 @@ def write_settings(assignments: list[str], path: Path) -> Settings:
                 f"the setting {visible(assignment)} holds a control character, or bytes that are not UTF-8."
             )
     command: list[str | Path] = [BIN / "tessera-settings", "--defaults", DEFAULTS_PATH, "--out", path]
+    if base is not None:
+        command += ["--file", base]
     for assignment in assignments:
         command += ["--set", assignment]
     merged = subprocess.run(command, capture_output=True, text=True, umask=0o077)
