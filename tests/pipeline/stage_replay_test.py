@@ -62,7 +62,7 @@ def test_an_extractor_that_said_something_else_is_noticed(tessera: Tessera, reco
     place = [i for i, event in enumerate(events) if event.channel == "TILE_FEATURES"][3]
     message = receive_logged(events[place].data)
     assert message is not None
-    message.score[5] += 1
+    message.score = [*message.score[:5], message.score[5] + 1, *message.score[6:]]
     events[place] = replace(events[place], data=message.encode())
     write_log(tmp_path / "changed.lcmlog", events)
     (tmp_path / "settings.yaml").write_text((recorded.parent / "settings.yaml").read_text())

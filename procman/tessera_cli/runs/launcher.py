@@ -25,6 +25,7 @@ from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summ
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.silence import SilenceWatch
 from tessera_cli.supervision.stack_monitor import StackMonitor
 from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.versions import tessera_version
@@ -77,6 +78,7 @@ class Launcher:
         self._monitor = StackMonitor(bus["main_url"], bus["channel_prefix"], deputy.owns, shares_extractors)
         self._interrupt = Interrupt()
         self._num_warnings_shown = 0
+        self._silence = SilenceWatch(lambda name: deputy.is_busy([name]))
         self._map_busy_at = 0.0  # monotonic seconds
 
     def run(self) -> int:
@@ -164,6 +166,8 @@ class Launcher:
         for warning in self._deputy.warnings[self._num_warnings_shown :]:
             view.say(warning)
         self._num_warnings_shown = len(self._deputy.warnings)
+        for sentence in self._silence.step(self._monitor.progress.stages.values(), time.monotonic()):
+            view.say(sentence)
 
     def _check_stall(self) -> None:
         progress = self._monitor.progress
@@ -194,7 +198,7 @@ class Launcher:
             cpu_s={process.name: process.cpu_s for process in processes},
             max_rss_mb={process.name: process.max_rss_mb for process in processes},
             num_extractor_restarts=self._deputy.num_restarts("extractor"),
-            warnings=self._deputy.warnings + self._missing_frames(),
+            warnings=self._deputy.warnings + self._silence.warnings + self._missing_frames(),
         )
         return write_summary(self._folder, run_facts, process_facts)
 
