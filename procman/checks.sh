@@ -27,7 +27,7 @@ run_tests() {
 
 run_pytest() (
   cd "$root"
-  PYTHONPATH="$root/procman" .venv/bin/python -m pytest -p no:cacheprovider -rs tests
+  PYTHONPATH="$root/procman" .venv/bin/python -P -m pytest -p no:cacheprovider -rs tests
 )
 
 # run_sanitized LIST: the C++ tests in a build of their own, under these sanitizers of the compiler. Without the recorded

@@ -111,14 +111,14 @@ make_python_env() {
       # A link leads to the environment of another checkout, which --clear would empty.
       [ ! -L "$folder" ] || rm "$folder"
       say "Making the Python environment $1, $purpose"
-      log_step "The Python environment could not be made." /usr/bin/python3 -m venv --clear "$folder"
+      log_step "The Python environment could not be made." /usr/bin/python3 -I -m venv --clear "$folder"
       ;;
   esac
   say "Installing the Python packages of procman/$2 into it"
   log_step "pip could not install the Python packages: is this machine online?" \
-    "$folder/bin/python" -m pip install --disable-pip-version-check --no-deps --only-binary=:all: -r "$requirements"
+    "$folder/bin/python" -I -m pip install --disable-pip-version-check --no-deps --only-binary=:all: -r "$requirements"
   # So that the first run does not wait for it.
-  log_step "The Python packages could not be compiled." "$folder/bin/python" -m compileall -q "$root/procman/tessera_cli"
+  log_step "The Python packages could not be compiled." "$folder/bin/python" -I -m compileall -q "$root/procman/tessera_cli"
   printf '%s\n' "$wanted" >"$stamp_file"
 }
 
@@ -211,7 +211,10 @@ build() {
 # prepare ask|tell: everything but the build. Two commands at once must not build into each other: the lock is held until
 # the command calls `finish_setup`.
 prepare() {
-  mkdir -p "$root/logs"
+  mkdir -p "$root/logs" 2>/dev/null || true
+  if ! { : >>"$root/logs/.setup.lock"; } 2>/dev/null; then
+    fail "this checkout belongs to $(stat -c %U "$root"), and $(id -un) can't write into $root/logs: use a checkout of your own."
+  fi
   exec 9>"$root/logs/.setup.lock"
   flock -n 9 || { say "Waiting for another tessera command that is setting up"; flock 9; }
   : >"$setup_log"

@@ -47,6 +47,8 @@ class FrameSource {
   virtual std::vector<std::string> TakeEvents() { return {}; }
   // Notes for the user about how the source was read, one sentence each; more may come with each frame.
   virtual const std::vector<std::string>& notes() const = 0;
+  // What is missing from the source, in one sentence; empty: nothing.
+  virtual std::string loss() const { return ""; }
 };
 
 // "mono", "stereo" or "rgbd". Throws InputError.

@@ -147,7 +147,7 @@ std::string LoopsCsv(const RunRecord& record) {
   return text;
 }
 
-std::string RunJson(const RunRecord& record) {
+std::string RunJson(const RunRecord& record, const std::vector<std::string>& not_written) {
   const FrameCounts counts = record.Counts();
   const std::vector<FrameRecord> frames = record.Frames();
   const std::vector<PartRecord> parts = record.Parts();
@@ -182,8 +182,9 @@ std::string RunJson(const RunRecord& record) {
                      {"messages_repaired", num_repaired},
                      {"messages_lost", num_lost},
                      {"trajectory_sha256", record.TrajectorySha256()},
-                     {"map_sha256", record.map().Sha256Hex()}};
-  return json.dump(2) + "\n";
+                     {"map_sha256", record.map().Sha256Hex()},
+                     {"not_written", not_written}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 void MakeRunFolder(const std::string& folder) {
@@ -194,18 +195,35 @@ void MakeRunFolder(const std::string& folder) {
   }
 }
 
-void WriteRun(const RunRecord& record, const std::string& folder, const Rigid3& base_from_camera) {
+std::vector<std::string> WriteRun(const RunRecord& record, const std::string& folder,
+                                  const Rigid3& base_from_camera, const std::vector<RunFile>& more) {
   const auto tum = [&](const std::vector<StampedPose>& poses) { return TumText(poses, base_from_camera); };
   MakeRunFolder(folder);
-  WriteFile(folder + "/trajectory.txt", PartsText(record.Parts()) + tum(record.Trajectory()));
-  WriteFile(folder + "/trajectory_live.txt", tum(record.LiveTrajectory()));
-  WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame(), base_from_camera));
-  WriteFile(folder + "/keyframes.txt", tum(record.Keyframes()));
-  WriteFile(folder + "/map.ply", PlyText(record.map(), base_from_camera));
-  WriteFile(folder + "/ground_truth.txt", tum(record.GroundTruth()));
-  WriteFile(folder + "/frames.csv", FramesCsv(record));
-  WriteFile(folder + "/loops.csv", LoopsCsv(record));
-  WriteFile(folder + "/run.json", RunJson(record));  // last: when it exists, so do the others
+  std::vector<std::string> not_written;
+  const auto try_to_write = [&](const RunFile& file) {
+    try {
+      file.write(file.path);
+    } catch (const std::exception& error) {
+      not_written.emplace_back(error.what());
+    }
+  };
+  const auto write_text = [&](const std::string& name, const std::function<std::string()>& text) {
+    try_to_write({folder + "/" + name, [&](const std::string& path) { WriteFile(path, text()); }});
+  };
+  write_text("trajectory.txt", [&] { return PartsText(record.Parts()) + tum(record.Trajectory()); });
+  write_text("trajectory_live.txt", [&] { return tum(record.LiveTrajectory()); });
+  write_text("trajectory_kitti.txt", [&] { return KittiText(record.PosePerFrame(), base_from_camera); });
+  write_text("keyframes.txt", [&] { return tum(record.Keyframes()); });
+  write_text("loops.csv", [&] { return LoopsCsv(record); });
+  write_text("frames.csv", [&] { return FramesCsv(record); });
+  write_text("ground_truth.txt", [&] { return tum(record.GroundTruth()); });
+  const std::string run_json = folder + "/run.json";
+  WriteFile(run_json, RunJson(record, not_written));
+  const size_t num_told = not_written.size();
+  for (const RunFile& file : more) try_to_write(file);
+  write_text("map.ply", [&] { return PlyText(record.map(), base_from_camera); });
+  if (not_written.size() > num_told) WriteFile(run_json, RunJson(record, not_written));
+  return not_written;
 }
 
 }  // namespace tessera

@@ -15,7 +15,7 @@ namespace tessera {
 // true pace. A message without such a time takes that of the last one that has it (or, in the beginning, of the first).
 class FileBus : public Bus {
  public:
-  explicit FileBus(const std::string& path) : writer_(path) {}
+  explicit FileBus(const std::string& path) : writer_(path, Checksums::kBeside) {}
 
   bool Publish(const std::string& channel, ByteView message, std::optional<int64_t> source_us) override;
   bool can_listen() const override { return false; }

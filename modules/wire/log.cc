@@ -35,12 +35,37 @@ using StreamName = std::pair<std::string, int64_t>;  // publisher and its start
 
 std::array<const Channel*, 4> CameraChannels() { return {&kCalibration, &kGroundTruth, &kCamera, &kEndOfStream}; }
 
+// By number, each once, and only of values of which every part is there.
+std::vector<Place> WholeValues(std::vector<Place> places) {
+  std::stable_sort(places.begin(), places.end(),
+                   [](const Place& a, const Place& b) { return a.sequence < b.sequence; });
+  const auto same = [](const Place& a, const Place& b) { return a.sequence == b.sequence; };
+  places.erase(std::unique(places.begin(), places.end(), same), places.end());
+  std::vector<Place> whole;
+  for (size_t first = 0; first < places.size();) {
+    size_t end = first;
+    while (end < places.size() && places[end].part == static_cast<int32_t>(end - first) &&
+           places[end].sequence == places[first].sequence + static_cast<int64_t>(end - first) &&
+           places[end].num_parts == places[first].num_parts &&
+           static_cast<int32_t>(end - first) < places[first].num_parts) {
+      ++end;
+    }
+    if (static_cast<int32_t>(end - first) == places[first].num_parts) {
+      whole.insert(whole.end(), places.begin() + static_cast<ptrdiff_t>(first),
+                   places.begin() + static_cast<ptrdiff_t>(end));
+    }
+    first = std::max(end, first + 1);
+  }
+  return whole;
+}
+
 }  // namespace
 
 struct LogReader::Impl {
   Impl(const std::string& log_path, const std::string& prefix);
   void Index(const std::string& prefix);
-  RecordedStream Order(const std::string& channel, std::vector<Place> places) const;
+  int64_t NumFramesSent();
+  FrameId IdOfFrame(size_t first_place);
   template <class Value>
   std::optional<LoggedValue> Join(ValueJoiner<Value>& joiner, const LogEvent& event, const MessageHeader& header);
   std::optional<LoggedValue> Take(size_t channel);
@@ -49,6 +74,7 @@ struct LogReader::Impl {
   LogFileReader file;
   std::array<RecordedStream, 4> streams;  // in the order of CameraChannels()
   int64_t num_frames = 0;
+  int64_t num_frames_sent = 0;
   ValueJoiner<CameraCalibration> calibrations;
   ValueJoiner<GroundTruthPose> truths;
   ValueJoiner<CameraFrame> frames;
@@ -81,28 +107,46 @@ void LogReader::Impl::Index(const std::string& prefix) {
                      " recordings of a camera: record each into a log of its own");
   }
   const StreamName camera = cameras.begin()->first;
-  for (size_t i = 0; i < found.size(); ++i) {
-    streams[i] = Order(CameraChannels()[i]->name, std::move(found[i][camera]));
-  }
+  for (size_t i = 0; i < found.size(); ++i) streams[i].places = WholeValues(std::move(found[i][camera]));
   num_frames = std::count_if(streams[2].places.begin(), streams[2].places.end(),
                              [](const Place& place) { return place.part == 0; });
+  if (num_frames == 0) {
+    throw InputError(
+        "log " + path +
+        " has no whole frame: it was recorded with losses; record the source with `procman/tessera record`");
+  }
+  num_frames_sent = NumFramesSent();
 }
 
-// By number, each once, from the first whole value on. Throws InputError if some are missing in between.
-RecordedStream LogReader::Impl::Order(const std::string& channel, std::vector<Place> places) const {
-  std::stable_sort(places.begin(), places.end(),
-                   [](const Place& a, const Place& b) { return a.sequence < b.sequence; });
-  const auto same = [](const Place& a, const Place& b) { return a.sequence == b.sequence; };
-  places.erase(std::unique(places.begin(), places.end(), same), places.end());
-  const auto whole = std::find_if(places.begin(), places.end(), [](const Place& place) { return place.part == 0; });
-  places.erase(places.begin(), whole);
-  const bool has_gap =
-      !places.empty() && places.back().sequence - places.front().sequence + 1 != static_cast<int64_t>(places.size());
-  if (has_gap || (!places.empty() && places.back().part + 1 != places.back().num_parts)) {
-    throw InputError("log " + path + " lacks messages on " + channel +
-                     ": it was cut, or recorded with losses; record it again with `procman/tessera record`");
+// As the camera counted them at its end, or else from the first whole frame to the last.
+int64_t LogReader::Impl::NumFramesSent() {
+  LogEvent event;
+  for (const Place& place : streams[3].places) {
+    file.Seek(place.position);
+    file.Next(&event);
+    ValueJoiner<EndOfStream> joiner;
+    const auto header = ReadHeader(event.data);
+    const Result<const EndOfStream*> end = joiner.Add(event.data, *header);
+    if (end && *end != nullptr) return std::max(num_frames, (*end)->num_frames);
   }
-  return {std::move(places), 0};
+  const std::vector<Place>& places = streams[2].places;
+  const auto last = std::find_if(places.rbegin(), places.rend(), [](const Place& place) { return place.part == 0; });
+  const size_t first_of_last = places.size() - 1 - static_cast<size_t>(last - places.rbegin());
+  return std::max(num_frames, IdOfFrame(first_of_last).value - IdOfFrame(0).value + 1);
+}
+
+// Of the whole frame whose first message is that one.
+FrameId LogReader::Impl::IdOfFrame(size_t first_place) {
+  ValueJoiner<CameraFrame> joiner;
+  LogEvent event;
+  for (size_t i = first_place; i < streams[2].places.size(); ++i) {
+    file.Seek(streams[2].places[i].position);
+    file.Next(&event);
+    const auto header = ReadHeader(event.data);
+    const std::optional<LoggedValue> frame = Join(joiner, event, *header);
+    if (frame) return std::get<CameraFrame>(*frame).id;
+  }
+  return {};
 }
 
 template <class Value>
@@ -162,5 +206,11 @@ std::optional<LoggedValue> LogReader::Next() {
 }
 
 int64_t LogReader::num_frames() const { return impl_->num_frames; }
+
+std::string LogReader::loss() const {
+  if (impl_->num_frames == impl_->num_frames_sent) return "";
+  return "log " + impl_->path + " lacks messages: " + std::to_string(impl_->num_frames) + " of " +
+         std::to_string(impl_->num_frames_sent) + " frames are whole, and the others are left out";
+}
 
 }  // namespace tessera

@@ -15,19 +15,23 @@ namespace tessera {
 using LoggedValue = std::variant<CameraCalibration, GroundTruthPose, CameraFrame, EndOfStream>;
 
 // Reads CALIBRATION, GROUND_TRUTH, CAMERA and the camera's END_OF_STREAM of one log, recorded by any means: messages
-// that were recorded out of order or twice are put right by their numbers, parts are joined.
+// that were recorded out of order or twice are put right by their numbers, parts are joined. A value that lacks a part
+// is left out, since stock recorders ask for nothing again.
 class LogReader {
  public:
   // Looks through the whole log at once, so that a damaged one is refused before anything is played. Throws
-  // InputError: no such file, not an LCM log, cut in the middle, messages missing, no CAMERA in it, two recordings.
+  // InputError: no such file, not an LCM log, cut in the middle, other bytes than its checksums say, no whole frame in
+  // it, two recordings.
   explicit LogReader(const std::string& path, const std::string& channel_prefix = "");
   ~LogReader();
 
   // The next value, in recorded order; nullopt at the end. Throws InputError if it makes no sense.
   std::optional<LoggedValue> Next();
 
-  // Frames in the log.
+  // Whole frames in the log.
   int64_t num_frames() const;
+  // How many frames are whole if not all are, in a sentence; else empty.
+  std::string loss() const;
 
  private:
   struct Impl;

@@ -6,8 +6,11 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <system_error>
 
+#include "core/crc32.h"
 #include "core/errors.h"
+#include "core/files.h"
 
 namespace tessera {
 namespace {
@@ -15,6 +18,14 @@ namespace {
 constexpr uint64_t kSync = 0xEDA1DA01;
 constexpr size_t kHeaderBytes = 4 + 8 + 8 + 4 + 4;
 constexpr uint64_t kMaxChannelLength = 255;
+constexpr std::string_view kChecksumsTitle = "CRC-32 of each event of an LCM log, by Tessera\n";
+
+std::string ChecksumsPath(const std::string& log_path) { return log_path + ".checksums"; }
+
+uint32_t ChecksumOf(ByteView header, const std::string& channel, ByteView data) {
+  const ByteView name(reinterpret_cast<const uint8_t*>(channel.data()), channel.size());
+  return Crc32(data, Crc32(name, Crc32(header)));
+}
 
 void PutBigEndian(uint64_t value, size_t size, uint8_t* bytes) {
   for (size_t i = 0; i < size; ++i) {
@@ -46,12 +57,38 @@ LogFileReader::LogFileReader(const std::string& path) : path_(path) {
     throw InputError("log " + path + " is not an LCM log: record one with `tessera record` or lcm-logger");
   }
   Seek(0);
+  ReadChecksums();
+}
+
+void LogFileReader::ReadChecksums() {
+  const std::string path = ChecksumsPath(path_);
+  has_checksums_ = std::filesystem::exists(path);
+  if (!has_checksums_) return;
+  const std::string bytes = ReadFile(path);
+  if (!bytes.starts_with(kChecksumsTitle) || (bytes.size() - kChecksumsTitle.size()) % 4 != 0) {
+    throw InputError("file " + path + " is damaged: copy it again, or remove it to use the log without its checksums");
+  }
+  const auto* values = reinterpret_cast<const uint8_t*>(bytes.data()) + kChecksumsTitle.size();
+  checksums_.resize((bytes.size() - kChecksumsTitle.size()) / 4);
+  for (size_t i = 0; i < checksums_.size(); ++i) {
+    checksums_[i] = static_cast<uint32_t>(GetBigEndian(values + 4 * i, 4));
+  }
+}
+
+void LogFileReader::Check(int64_t number, uint32_t checksum, const std::string& channel) const {
+  const auto i = static_cast<size_t>(number);
+  if (number >= 0 && i < checksums_.size() && checksums_[i] == checksum) return;
+  throw InputError("log " + path_ + " is damaged before byte " + std::to_string(position()) + ", in a message on " +
+                   channel + ": it has not the checksum in " + ChecksumsPath(path_) +
+                   "; copy or record it again, or remove that file to use the log as it is");
 }
 
 bool LogFileReader::Next(LogEvent* event) {
   std::array<uint8_t, kHeaderBytes> header{};
   const size_t num_read = std::fread(header.data(), 1, header.size(), file_.get());
   if (num_read == 0) {
+    // Cut between two events.
+    if (has_checksums_ && last_number_ + 1 != static_cast<int64_t>(checksums_.size())) ThrowCut();
     return false;
   }
   const uint64_t channel_length = GetBigEndian(header.data() + 20, 4);
@@ -68,6 +105,8 @@ bool LogFileReader::Next(LogEvent* event) {
       std::fread(event->data.data(), 1, data_length, file_.get()) != data_length) {
     ThrowCut();
   }
+  last_number_ = static_cast<int64_t>(GetBigEndian(header.data() + 4, 8));
+  if (has_checksums_) Check(last_number_, ChecksumOf(header, event->channel, event->data), event->channel);
   return true;
 }
 
@@ -80,7 +119,8 @@ void LogFileReader::ThrowCut() const {
                    std::to_string(size_) + ": record or copy it again");
 }
 
-LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(std::fopen((path + ".part").c_str(), "wb")) {
+LogFileWriter::LogFileWriter(const std::string& path, Checksums checksums)
+    : path_(path), file_(std::fopen((path + ".part").c_str(), "wb")), mode_(checksums) {
   if (file_ == nullptr) {
     ThrowUnwritable(path + ".part");
   }
@@ -90,6 +130,21 @@ LogFileWriter::~LogFileWriter() {
   if (file_ == nullptr) return;
   std::fclose(file_);
   std::remove((path_ + ".part").c_str());
+}
+
+void LogFileWriter::Abandon(int64_t room_bytes) {
+  if (file_ == nullptr) return;
+  std::fclose(file_);
+  file_ = nullptr;
+  const std::string part = path_ + ".part";
+  std::error_code error;
+  const auto size = static_cast<int64_t>(std::filesystem::file_size(part, error));
+  if (error) return;
+  if (size > room_bytes) {
+    std::filesystem::resize_file(part, static_cast<uintmax_t>(size - room_bytes), error);
+  } else {
+    std::filesystem::remove(part, error);
+  }
 }
 
 void LogFileWriter::Write(int64_t time_us, const std::string& channel, ByteView data) {
@@ -104,6 +159,7 @@ void LogFileWriter::Write(int64_t time_us, const std::string& channel, ByteView 
       std::fwrite(data.data(), 1, data.size(), file_) != data.size()) {
     ThrowUnwritable(path_ + ".part");
   }
+  if (mode_ == Checksums::kBeside) checksums_.push_back(ChecksumOf(header, channel, data));
   ++num_events_;
   num_bytes_ += static_cast<int64_t>(header.size() + channel.size() + data.size());
 }
@@ -114,11 +170,25 @@ void LogFileWriter::Close() {
   const bool is_on_disk = std::fflush(file_) == 0 && fsync(fileno(file_)) == 0;
   const bool is_written = std::fclose(file_) == 0 && is_on_disk;
   file_ = nullptr;
-  if (is_written && std::rename((path_ + ".part").c_str(), path_.c_str()) == 0) return;
+  std::remove(ChecksumsPath(path_).c_str());  // those of an earlier log
+  if (is_written && std::rename((path_ + ".part").c_str(), path_.c_str()) == 0) {
+    if (mode_ == Checksums::kBeside) WriteChecksums();
+    return;
+  }
   const int problem = errno;
   std::remove((path_ + ".part").c_str());
   errno = problem;
   ThrowUnwritable(path_);
+}
+
+void LogFileWriter::WriteChecksums() const {
+  std::string bytes(kChecksumsTitle);
+  for (const uint32_t checksum : checksums_) {
+    std::array<uint8_t, 4> value{};
+    PutBigEndian(checksum, value.size(), value.data());
+    bytes.append(value.begin(), value.end());
+  }
+  WriteFile(ChecksumsPath(path_), bytes);
 }
 
 void LogFileWriter::ThrowUnwritable(const std::string& path) const {

@@ -2,12 +2,15 @@
 //   0xEDA1DA01 (4 bytes), number (8), time in us (8), length of the channel (4), of the data (4), channel, data.
 // Read and written here rather than by LCM, whose reader believes the lengths and can't tell a damaged log from its
 // end.
+//
+// A log of ours has a file beside it, LOG.checksums: a line that says so, then the CRC-32 of each event, 4 bytes each.
 #pragma once
 
 #include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "wire/bytes.h"
 
@@ -21,10 +24,10 @@ struct LogEvent {
 
 class LogFileReader {
  public:
-  // Throws InputError if there is no such file or it is not an LCM log.
+  // Throws InputError if there is no such file, it is not an LCM log, or what is beside it has no checksums.
   explicit LogFileReader(const std::string& path);
 
-  // False at the end of the file. Throws InputError if an event is damaged or cut off.
+  // False at the end of the file. Throws InputError if an event is damaged or cut off, or has not its checksum.
   bool Next(LogEvent* event);
   // Where the next event begins, bytes from the front; and going there.
   int64_t position() const;
@@ -35,17 +38,24 @@ class LogFileReader {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
   [[noreturn]] void ThrowCut() const;
+  void ReadChecksums();
+  void Check(int64_t number, uint32_t checksum, const std::string& channel) const;
 
   std::string path_;
   std::unique_ptr<std::FILE, CloseFile> file_;
   int64_t size_ = 0;
+  bool has_checksums_ = false;
+  std::vector<uint32_t> checksums_;  // by number of the event
+  int64_t last_number_ = -1;         // of the event that was read last
 };
+
+enum class Checksums { kNone, kBeside };
 
 class LogFileWriter {
  public:
   // Writes into PATH.part, which takes the name PATH when it is closed: no log is ever half written. Throws InputError
   // if it can't be written.
-  explicit LogFileWriter(const std::string& path);
+  explicit LogFileWriter(const std::string& path, Checksums checksums = Checksums::kNone);
   ~LogFileWriter();  // without Close(): nothing is kept
   LogFileWriter(const LogFileWriter&) = delete;
   LogFileWriter& operator=(const LogFileWriter&) = delete;
@@ -53,6 +63,9 @@ class LogFileWriter {
   // Throws InputError if the disk is full.
   void Write(int64_t time_us, const std::string& channel, ByteView data);
   void Close();
+  // After a failure: what is written stays as PATH.part, except its last `room_bytes`, which are given back to the
+  // disk. Nothing is written from then on.
+  void Abandon(int64_t room_bytes);
 
   int64_t num_events() const { return num_events_; }
   int64_t num_bytes() const { return num_bytes_; }
@@ -62,6 +75,10 @@ class LogFileWriter {
 
   std::string path_;
   std::FILE* file_;
+  void WriteChecksums() const;
+
+  Checksums mode_;
+  std::vector<uint32_t> checksums_;
   int64_t num_events_ = 0;
   int64_t num_bytes_ = 0;
 };

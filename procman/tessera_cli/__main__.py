@@ -1,4 +1,4 @@
-"""python -m tessera_cli COMMAND ...: what procman/tessera runs."""
+"""python -P -m tessera_cli COMMAND ...: what procman/tessera runs."""
 
 import sys
 

@@ -17,6 +17,7 @@ MAX_MESSAGES_PER_TURN = 200
 
 # --- Channels (lcmtypes/README.md) --------------------------------------------------------------------------------
 STATUS, POSE, HEARTBEAT, CAMERA, END_OF_STREAM = "STATUS", "POSE", "HEARTBEAT", "CAMERA", "END_OF_STREAM"
+REPAIR = "REPAIR"
 PROCMAN_ORDER, PROCMAN_STATUS, PROCMAN_OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
 
 # --- Limits -------------------------------------------------------------------------------------------------------
@@ -76,6 +77,8 @@ RECORDER_STOP_TIMEOUT_S = 60.0
 MAP_WRITER_STOP_TIMEOUT_S = 5.0
 # A run ends its stack in order, which may have to wait for a long step.
 EXPERIMENT_STOP_TIMEOUT_S = 20.0
+# A stage, which reports twice a second, is missed after this long.
+SILENT_STAGE_S = 3.0
 # A stack without any status for this long has ended.
 SILENT_STACK_S = 5.0
 

@@ -1,6 +1,7 @@
-"""The folders of this checkout, and files that are written whole or not at all."""
+"""The folders of this checkout, its Python, and files that are written whole or not at all."""
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,14 @@ PROCMAN = ROOT / "procman"
 # TESSERA_BUILD: another build of the same sources, for developers.
 BUILD = Path(os.environ.get("TESSERA_BUILD", ROOT / "build"))
 BIN = BUILD / "bin"
+
+
+def python_command(module: str) -> list[str]:
+    """Runs a module in another process, with `PYTHONPATH`: the folder that holds tessera_cli.
+
+    -P: modules are not looked for in the working folder, which may be anybody's. UTF-8 whatever the locale.
+    """
+    return [sys.executable, "-P", "-X", "utf8", "-m", module]
 
 
 def unfinished(path: Path) -> Path:
@@ -32,6 +41,20 @@ def write_text(path: Path, text: str) -> None:
     """Writes `path` whole or not at all."""
     with replacing(path) as written:
         written.write_text(text)
+
+
+def write_private(path: Path, data: bytes) -> None:
+    """Writes `path` whole or not at all. Nobody else can read or change it."""
+    with replacing(path) as written:
+        written.unlink(missing_ok=True)
+        with os.fdopen(os.open(written, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(data)
+
+
+def changed_by_others(path: Path) -> bool:
+    """Whether other users (except root) can change this file or folder."""
+    status = path.stat()
+    return status.st_uid not in (os.geteuid(), 0) or bool(status.st_mode & 0o022)
 
 
 def absolute(text: str) -> Path:

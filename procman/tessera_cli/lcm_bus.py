@@ -4,16 +4,20 @@ import os
 import select
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import lcm
 
 from tessera_cli.constants import MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
-from tessera_cli.errors import RunError
+from tessera_cli.errors import RunError, UserError
+from tessera_cli.files import replacing
 from tessera_cli.membership import is_of_member
-from tessera_cli.messages import decode, header_t
+from tessera_cli.messages import header_t, receive
+
+LOG_SYNC = bytes.fromhex("eda1da01")  # the first bytes of each event in a log
 
 
 def bus_url(port: int, time_to_live: int = 0) -> str:
@@ -63,7 +67,7 @@ class Bus:
             if secret is not None and not is_of_member(channel, data, secret):
                 self.num_strangers += 1
                 return
-            message: Any = data if message_type is None else decode(message_type, data)
+            message: Any = data if message_type is None else receive(message_type, data)
             if message is None:
                 return
             if secret is not None and message_type is not None:
@@ -125,6 +129,46 @@ def log_events(path: Path) -> Iterator[tuple[str, bytes]]:
         yield from ((event.channel, event.data) for event in log)
     finally:
         log.close()
+
+
+@dataclass(frozen=True)
+class LoggedEvent:
+    """One message in a log."""
+
+    time_us: int  # since 1970, or of the recorder's choice
+    channel: str
+    data: bytes
+
+
+def read_log(path: Path) -> Iterator[LoggedEvent]:
+    """All events of a log. Raises UserError if it is none, or behind the last event that is whole."""
+    with open(path, "rb") as file:
+        if file.read(4) != LOG_SYNC:
+            raise UserError(f"{path} is no LCM log.")
+    log = lcm.EventLog(str(path), "r")
+    try:
+        read_until = 0
+        for event in log:
+            yield LoggedEvent(event.timestamp, event.channel, event.data)
+            read_until = log.tell()
+        if read_until < log.size():
+            raise UserError(f"{path} is cut off or damaged behind byte {read_until:,} of {log.size():,}.")
+    finally:
+        log.close()
+
+
+def write_log(path: Path, events: Iterable[LoggedEvent]) -> int:
+    """Writes the log whole or not at all. Returns the number of events."""
+    num_events = 0
+    with replacing(path) as written:
+        log = lcm.EventLog(str(written), "w", overwrite=True)
+        try:
+            for event in events:
+                log.write_event(event.time_us, event.channel, event.data)
+                num_events += 1
+        finally:
+            log.close()
+    return num_events
 
 
 def log_messages(path: Path, channel: str) -> Iterator[bytes]:

@@ -1,11 +1,14 @@
 """The message types that the build generates from lcmtypes/, and how their bytes are decoded."""
 
 import importlib
+import io
 import struct
 import sys
+from functools import cache
 from typing import Any
 
 from tessera_cli.files import BUILD
+from tessera_cli.text import visible, visible_lines
 
 sys.path.insert(0, str(BUILD / "lcmtypes" / "python"))
 
@@ -21,13 +24,13 @@ from tessera import (
     procman_process_t,
     procman_status_t,
     procman_wish_t,
+    repair_request_t,
     stage_status_t,
 )
 
 __all__ = [
     "camera_image_t",
     "decode",
-    "decode_as",
     "end_of_stream_t",
     "header_t",
     "heartbeat_t",
@@ -38,9 +41,13 @@ __all__ = [
     "procman_process_t",
     "procman_status_t",
     "procman_wish_t",
+    "receive",
+    "receive_as",
+    "repair_request_t",
     "stage_status_t",
 ]
 
+FINGERPRINT_BYTES, MAX_HEADER_BYTES = 8, 1000
 # What generated code raises on bytes that are no such message.
 _DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
 
@@ -53,7 +60,62 @@ def decode(message_type: Any, data: bytes) -> Any | None:
         return None
 
 
-def decode_as(type_name: str, data: bytes) -> Any | None:
-    """As `decode`, of the type of this name; None also if the build, of another commit, has no such type."""
+def receive(message_type: Any, data: bytes) -> Any | None:
+    """As `decode`; what others wrote into its texts may be printed."""
+    message = decode(message_type, data)
+    if message is not None:
+        _make_visible(message)
+    return message
+
+
+def receive_as(type_name: str, data: bytes) -> Any | None:
+    """As `receive`, of the type of this name; None also if the build, of another commit, has no such type."""
     message_type = getattr(importlib.import_module("tessera"), type_name, None)
-    return decode(message_type, data) if message_type else None
+    return receive(message_type, data) if message_type else None
+
+
+@cache
+def _types_by_fingerprint() -> dict[bytes, Any]:
+    types = [value for name, value in vars(importlib.import_module("tessera")).items() if name.endswith("_t")]
+    return {message_type._get_packed_fingerprint(): message_type for message_type in types}
+
+
+def type_name_of(data: bytes) -> str | None:
+    """The type of a message; None: it is none of ours."""
+    message_type = _types_by_fingerprint().get(data[:FINGERPRINT_BYTES])
+    return message_type.__name__ if message_type else None
+
+
+def receive_logged(data: bytes) -> Any | None:
+    """As `receive`, of whatever type of ours it is."""
+    message_type = _types_by_fingerprint().get(data[:FINGERPRINT_BYTES])
+    return receive(message_type, data) if message_type else None
+
+
+def header_of(data: bytes) -> header_t | None:
+    """The header of a message of ours, without the rest, which may be an image; None: it has none."""
+    message_type = _types_by_fingerprint().get(data[:FINGERPRINT_BYTES])
+    if message_type is None or message_type.__slots__[0] != "header":
+        return None
+    try:
+        header = header_t._decode_one(io.BytesIO(data[FINGERPRINT_BYTES : FINGERPRINT_BYTES + MAX_HEADER_BYTES]))
+    except _DECODE_ERRORS:
+        return None
+    _make_visible(header)
+    return header
+
+
+def _make_visible(message: Any) -> None:
+    """All texts of the message and of the messages in it; only output of processes has lines."""
+    for name in message.__slots__:
+        value = getattr(message, name)
+        if isinstance(value, str):
+            has_lines = isinstance(message, procman_output_t) and name == "text"
+            setattr(message, name, visible_lines(value) if has_lines else visible(value))
+        elif isinstance(value, list) and value and isinstance(value[0], str):
+            setattr(message, name, [visible(text) for text in value])
+        else:
+            for part in value if isinstance(value, list) else [value]:
+                if not hasattr(part, "__slots__"):
+                    break
+                _make_visible(part)

@@ -216,6 +216,39 @@ TEST_F(RunFilesTest, AnEmptyRunHasFilesToo) {
   EXPECT_TRUE(json["parts"].empty());
 }
 
+TEST_F(RunFilesTest, AFileThatCantBeWrittenLeavesTheOthersAndIsTold) {
+  fs::create_directories(folder_ + "/trajectory.txt/taken");
+  fs::create_directories(folder_ + "/map.ply/taken");
+  const auto fails = [](const std::string& path) { throw std::runtime_error("no room for " + path); };
+  const auto works = [](const std::string& path) { WriteFile(path, "a map"); };
+  const auto not_written =
+      WriteRun(SmallRun(), folder_, {{folder_ + "/map.tessera", fails}, {folder_ + "/copy.tessera", works}});
+  ASSERT_EQ(not_written.size(), 3U);
+  EXPECT_NE(not_written[0].find("trajectory.txt"), std::string::npos);
+  EXPECT_EQ(not_written[1], "no room for " + folder_ + "/map.tessera");
+  EXPECT_NE(not_written[2].find("map.ply"), std::string::npos);
+  for (const char* name : {"trajectory_live.txt", "keyframes.txt", "frames.csv", "copy.tessera"}) {
+    EXPECT_FALSE(Read(name).empty()) << name;
+  }
+  EXPECT_EQ(nlohmann::json::parse(Read("run.json"))["not_written"], nlohmann::json(not_written));
+}
+
+TEST_F(RunFilesTest, SmallAndPreciousFilesAreThereBeforeTheMaps) {
+  std::string run_json;
+  const auto look = [&](const std::string&) { run_json = Read("run.json"); };
+  EXPECT_TRUE(WriteRun(SmallRun(), folder_, {{folder_ + "/map.tessera", look}}).empty());
+  EXPECT_EQ(run_json, Read("run.json"));
+  EXPECT_TRUE(nlohmann::json::parse(run_json)["not_written"].empty());
+}
+
+TEST_F(RunFilesTest, ANameThatIsNoUtf8DoesNotKeepTheRunFromItsEnd) {
+  RunRecord record = SmallRun();
+  record.SetStage("tr\xff\xfe", {.step_ms = {3, 2.0, 1.5, 4.0, 5.0, 6.0}, .values = {{"\xc3", 1.0}}});
+  EXPECT_TRUE(WriteRun(record, folder_).empty());
+  const auto json = nlohmann::json::parse(Read("run.json"));
+  EXPECT_TRUE(json["stage_ms"].contains("tr\uFFFD\uFFFD"));
+}
+
 TEST_F(RunFilesTest, AFolderThatCantBeMadeIsRefused) {
   WriteFile(folder_ + "/a.txt", "a file");
   EXPECT_THROW(WriteRun(SmallRun(), folder_ + "/a.txt"), InputError);

@@ -3,11 +3,11 @@
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any, Protocol
 
 from helpers.stack import ROOT, RUN_TIMEOUT_S, environment, read_line
+from tessera_cli.files import python_command
 
 PORTS_PER_NODE = 25
 # Two test suites on one machine use different ports.
@@ -42,7 +42,7 @@ class Node:
 
     def line(self, *words: object) -> list[str]:
         return [
-            *(*self._prefix, sys.executable, "-m", "tessera_cli"),
+            *(*self._prefix, *python_command("tessera_cli")),
             *map(str, words),
             *("--port", str(self.port)),
             *self._lan,

@@ -3,12 +3,13 @@
 import json
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from tessera_cli.files import python_command
 
 ROOT = Path(__file__).resolve().parents[2]
 # A run of a few frames takes seconds; a hang must not stop the whole suite.
@@ -127,4 +128,4 @@ class Tessera:
         return self._folder / f"run {self._num_runs}"
 
     def _command_line(self, arguments: tuple[object, ...]) -> list[str]:
-        return [sys.executable, "-m", "tessera_cli", *map(str, arguments)]
+        return [*python_command("tessera_cli"), *map(str, arguments)]

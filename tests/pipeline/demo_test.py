@@ -45,7 +45,7 @@ def test_the_result_is_told(first: Finished, folder: Path) -> None:
 
 
 def test_only_its_own_old_drives_go(first: Finished, folder: Path) -> None:
-    assert logs_in(folder) == sorted([log_name(FRAMES), "mine.lcmlog"])
+    assert logs_in(folder) == sorted([log_name(FRAMES), f"{log_name(FRAMES)}.checksums", "mine.lcmlog"])
 
 
 def test_a_second_call_uses_the_drive_again(tessera: Tessera, first: Finished, folder: Path) -> None:

@@ -14,6 +14,8 @@ import lcm
 import pytest
 
 from helpers.stack import NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera, pids_of, read_line, wait_for
+from tessera_cli.lcm_bus import LoggedEvent, read_log, write_log
+from tessera_cli.messages import receive_logged
 
 # All poses of the made sequence are known exactly; the room is 14 m wide.
 MAX_RMS_ERROR_M = 0.05
@@ -267,7 +269,7 @@ def log(tessera: Tessera, sequence: Path, tmp_path_factory: pytest.TempPathFacto
     log = tmp_path_factory.mktemp("logs") / "room 1.lcmlog"
     finished = tessera.command("record", f"kitti:{sequence}", log).must_end_well()
     assert f"{NUM_FRAMES} frames" in finished.out
-    assert [path.name for path in log.parent.iterdir()] == [log.name]
+    assert {path.name for path in log.parent.iterdir()} == {log.name, f"{log.name}.checksums"}
     return log
 
 
@@ -301,6 +303,37 @@ def test_a_log_cut_in_the_middle_is_refused(tessera: Tessera, log: Path, tmp_pat
     finished = tessera.run(cut, command="replay")
     assert finished.status == 2, finished.out + finished.err
     assert "cut.lcmlog" in finished.err and finished.err.count("\n") == 1
+
+
+def test_a_log_of_ours_with_a_flipped_bit_is_refused(tessera: Tessera, log: Path, tmp_path: Path) -> None:
+    """In the middle of an image, where nothing else would notice it."""
+    flipped = tmp_path / "flipped.lcmlog"
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 1
+    flipped.write_bytes(data)
+    shutil.copy(f"{log}.checksums", f"{flipped}.checksums")
+    finished = tessera.run(flipped, command="replay")
+    assert finished.status == 2 and "checksum" in finished.err and finished.err.count("\n") == 1, finished.err
+
+
+def test_a_log_that_lacks_messages_is_used_as_far_as_it_goes(tessera: Tessera, log: Path, tmp_path: Path) -> None:
+    """As stock lcm-logger leaves it, which asks for nothing again: here without a band of each of three frames."""
+    lost = {10, 11, 40}
+    lossy, dropped = tmp_path / "lossy.lcmlog", set[int]()
+
+    def is_kept(event: LoggedEvent) -> bool:
+        if event.channel != "CAMERA":
+            return True
+        message = receive_logged(event.data)
+        assert message is not None
+        is_lost = message.frame in lost - dropped
+        dropped.update({message.frame} if is_lost else ())
+        return not is_lost
+
+    write_log(lossy, filter(is_kept, read_log(log)))
+    finished = tessera.run(lossy, command="replay").must_end_well()
+    assert f"lacks messages: {NUM_FRAMES - 3} of {NUM_FRAMES} frames are whole" in finished.out
+    assert finished.summary["frames_tracked"] >= NUM_FRAMES - 3 - 2
 
 
 def publish_noise(port: int, generator: random.Random) -> None:

@@ -1,6 +1,8 @@
 // The recorder's log has every message of every stream once and in order, whatever the network loses.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <map>
 #include <random>
@@ -84,6 +86,47 @@ TEST_F(RecorderTest, HasWhatWasSentBeforeItCame) {
   bus.RunUntilQuiet();
   bus.Kill("recorder");
   EXPECT_EQ(ReadNumbers()["POSE"], Counted(10));
+}
+
+// Files of this process can't grow beyond a size, as on a full disk.
+class SmallDisk {
+ public:
+  explicit SmallDisk(rlim_t max_file_bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{max_file_bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~SmallDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(RecorderTest, OnAFullDiskItGivesUpWithoutEndingTheRunAndItsLogIsNotTakenForAWholeOne) {
+  const SmallDisk disk(100'000);
+  MemoryBus bus(MakeSettings(""));
+  std::mt19937 generator(4);
+  bus.Start<RecorderStage>("recorder");
+  const auto frames = bus.AddContext("camera").Advertise(kCamera);
+  for (int i = 0; i < 100; ++i) frames.Publish(DrawValue<CameraFrame>(generator, 1));
+  bus.RunUntilQuiet();
+  EXPECT_EQ(bus.exit_status("recorder"), 0) << "the run goes on";
+  bus.Kill("recorder");
+  EXPECT_FALSE(std::filesystem::exists(path_));
+}
+
+TEST_F(RecorderTest, AnAbandonedLogKeepsItsBeginningAndGivesRoomBack) {
+  LogFileWriter log(path_);
+  for (int i = 0; i < 10; ++i) log.Write(i, "CHANNEL", Bytes(1000));
+  log.Abandon(2000);
+  EXPECT_FALSE(std::filesystem::exists(path_));
+  LogFileReader reader(path_ + ".part");
+  int num_events = 0;
+  EXPECT_THROW(for (LogEvent event; reader.Next(&event);)++ num_events, InputError);
+  EXPECT_EQ(num_events, 8);
 }
 
 TEST_F(RecorderTest, APathThatCantBeWrittenIsRefused) {

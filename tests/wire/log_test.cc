@@ -63,8 +63,8 @@ class LogTest : public testing::Test {
     Add(kEndOfStream, EndOfStream{.stage = StageKind::kCamera, .num_frames = kNumFrames});
     Add(kEndOfStream, EndOfStream{.stage = StageKind::kDispatcher, .num_frames = kNumFrames}, "dispatcher");
   }
-  std::string Write() {
-    LogFileWriter writer(Path("log"));
+  std::string Write(Checksums checksums = Checksums::kNone) {
+    LogFileWriter writer(Path("log"), checksums);
     for (const Event& event : events_) writer.Write(event.time_us, event.channel, event.data);
     writer.Close();
     return Path("log");
@@ -150,11 +150,83 @@ TEST_F(LogTest, CutAnywhereIsRefusedWithItsName) {
   }
 }
 
-TEST_F(LogTest, MissingMessagesAreFound) {
+TEST_F(LogTest, LackingMessagesItIsUsedAsFarAsItGoes) {
   AddRecording();
   const auto camera = [](const Event& event) { return event.channel == "CAMERA"; };
-  events_.erase(std::find_if(events_.begin() + 12, events_.end(), camera));
-  EXPECT_NE(Refusal(Write()).find("lacks"), std::string::npos);
+  const auto lost = std::find_if(events_.begin() + 12, events_.end(), camera);
+  events_.erase(lost);
+  LogReader reader(Write());
+  EXPECT_EQ(reader.num_frames(), kNumFrames - 1);
+  EXPECT_NE(reader.loss().find("4 of 5 frames are whole"), std::string::npos) << reader.loss();
+  std::vector<FrameId> ids;
+  while (const auto value = reader.Next()) {
+    if (const auto* frame = std::get_if<CameraFrame>(&*value)) {
+      ids.push_back(frame->id);
+      EXPECT_EQ(*frame, frames_[static_cast<size_t>(frame->id.value)]);
+    }
+  }
+  EXPECT_EQ(ids.size(), kNumFrames - 1U);
+}
+
+TEST_F(LogTest, WithoutAnEndTheFramesInBetweenAreMissed) {
+  AddRecording();
+  std::erase_if(events_, [](const Event& event) { return event.channel == "END_OF_STREAM"; });
+  std::erase_if(events_, [](const Event& event) { return event.channel == "CAMERA" && event.time_us == 100'000; });
+  LogReader reader(Write());
+  EXPECT_NE(reader.loss().find("4 of 5 frames are whole"), std::string::npos) << reader.loss();
+}
+
+TEST_F(LogTest, AWholeOneLacksNothing) {
+  AddRecording();
+  EXPECT_EQ(LogReader(Write()).loss(), "");
+}
+
+TEST_F(LogTest, WithoutAnyWholeFrameItIsRefused) {
+  AddRecording();
+  std::erase_if(events_,
+                [](const Event& event) { return event.channel == "CAMERA" && ReadHeader(event.data)->part == 0; });
+  EXPECT_NE(Refusal(Write()).find("no whole frame"), std::string::npos);
+}
+
+TEST_F(LogTest, WithChecksumsEveryFlippedBitIsFound) {
+  AddRecording();
+  const std::string path = Write(Checksums::kBeside);
+  EXPECT_EQ(Refusal(path), "");
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  const auto size = std::filesystem::file_size(path);
+  std::mt19937 generator(5);
+  for (int i = 0; i < 200; ++i) {
+    const auto position = static_cast<std::streamoff>(generator() % size);
+    const auto flip = [&] {
+      file.seekg(position);
+      const auto byte = static_cast<char>(file.get() ^ (1 << (i % 8)));
+      file.seekp(position);
+      file.put(byte).flush();
+    };
+    flip();
+    EXPECT_NE(Refusal(path), "") << "byte " << position;
+    flip();
+  }
+  EXPECT_EQ(Refusal(path), "");
+}
+
+TEST_F(LogTest, WithChecksumsACutBetweenTwoEventsIsFound) {
+  AddRecording();
+  const std::string path = Write(Checksums::kBeside);
+  LogFileReader reader(path);
+  LogEvent event;
+  for (size_t i = 0; i + 1 < events_.size(); ++i) reader.Next(&event);
+  std::filesystem::resize_file(path, static_cast<uintmax_t>(reader.position()));
+  EXPECT_NE(Refusal(path).find("cut off"), std::string::npos);
+}
+
+TEST_F(LogTest, ANewLogHasNotTheChecksumsOfAnOldOne) {
+  AddRecording();
+  Write(Checksums::kBeside);
+  events_.pop_back();
+  EXPECT_EQ(Refusal(Write()), "");
+  std::ofstream(Path("log.checksums")) << "no checksums";
+  EXPECT_NE(Refusal(Path("log")).find("log.checksums is damaged"), std::string::npos);
 }
 
 TEST_F(LogTest, WhatIsNoLogIsRefused) {

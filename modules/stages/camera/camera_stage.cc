@@ -57,6 +57,7 @@ CameraStage::CameraStage(StageContext& context)
       end_of_stream_(context.Advertise(kEndOfStream)) {
   for (const std::string& note : session_.source().notes()) context.Info(note);
   num_notes_told_ = session_.source().notes().size();
+  if (const std::string loss = session_.source().loss(); !loss.empty()) context.ReportError(loss);
   context.Subscribe(kPose, [this](const PoseEstimate& pose) {
     return session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us());
   });

@@ -22,6 +22,7 @@ class LogSource : public FrameSource {
   std::optional<CameraFrame> Next() override;
   bool is_live() const override { return false; }
   const std::vector<std::string>& notes() const override { return notes_; }
+  std::string loss() const override { return reader_.loss(); }
 
  private:
   // A run is repeated as it went: what the dispatcher dropped then is not sent now.

@@ -61,7 +61,7 @@ void EvaluatorStage::FinishIfDone() {
   try {
     Write();
   } catch (const InputError& error) {
-    return context_.Fail(error.what(), 2);
+    return context_.Fail(error.what(), 1);  // the input was good, but the disk is full, say
   }
   context_.Finish();
 }
@@ -69,9 +69,11 @@ void EvaluatorStage::FinishIfDone() {
 void EvaluatorStage::Write() {
   const RunRecord& record = session_.TakeRecord();
   if (out_dir_.empty()) return;
-  WriteMapFile(record.map(), out_dir_ + "/map.tessera");
-  SaveMap();
-  WriteRun(record, out_dir_, context_.settings().Get<BodySettings>().BaseFromCamera());
+  const auto write_map = [&](const std::string& path) { WriteMapFile(record.map(), path); };
+  std::vector<RunFile> maps = {{out_dir_ + "/map.tessera", write_map}};
+  if (!map_path_.empty()) maps.push_back({map_path_, [this](const std::string&) { SaveMap(); }});
+  const Rigid3 base_from_camera = context_.settings().Get<BodySettings>().BaseFromCamera();
+  for (const std::string& sentence : WriteRun(record, out_dir_, base_from_camera, maps)) context_.ReportError(sentence);
   context_.Info("wrote the run to " + out_dir_);
 }
 

@@ -8,6 +8,9 @@
 namespace tessera {
 namespace {
 
+// Of a disk that the recording has filled, this is given back for the trajectory, tables and logs of the run.
+constexpr int64_t kRoomForTheRunBytes = 64'000'000;
+
 std::string PathFrom(const Settings& settings) {
   const auto path = settings.Get<RecorderSettings>().path;
   if (path.empty()) {
@@ -18,7 +21,8 @@ std::string PathFrom(const Settings& settings) {
 
 }  // namespace
 
-RecorderStage::RecorderStage(StageContext& context) : context_(context), log_(PathFrom(context.settings())) {
+RecorderStage::RecorderStage(StageContext& context)
+    : context_(context), log_(PathFrom(context.settings()), Checksums::kBeside) {
   context.SubscribeAll([this](const std::string& channel, ByteView message, int64_t arrival_us) {
     Write(channel, message, arrival_us);
   });
@@ -30,18 +34,26 @@ RecorderStage::RecorderStage(StageContext& context) : context_(context), log_(Pa
 
 RecorderStage::~RecorderStage() {
   try {
-    log_.Close();
+    if (is_whole_) log_.Close();
   } catch (const InputError& error) {
-    context_.Fail(error.what(), 2);
+    context_.Fail(error.what(), 1);
   }
 }
 
+void RecorderStage::GiveUp(const std::string& problem) {
+  is_whole_ = false;
+  log_.Abandon(kRoomForTheRunBytes);
+  context_.ReportError(problem + "; the run continues without a recording");
+  context_.SetValue("is_whole", 0.0);
+}
+
 void RecorderStage::Write(const std::string& channel, ByteView message, int64_t arrival_us) {
+  if (!is_whole_) return;
   time_us_ = std::max(time_us_, arrival_us);
   try {
     log_.Write(time_us_, channel, message);
   } catch (const InputError& error) {
-    context_.Fail(error.what(), 2);
+    GiveUp(error.what());
   }
 }
 

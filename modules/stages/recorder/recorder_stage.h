@@ -12,16 +12,19 @@ namespace tessera {
 class RecorderStage {
  public:
   explicit RecorderStage(StageContext& context);
-  // The log takes its name.
+  // The log takes its name, unless it is not whole.
   ~RecorderStage();
   RecorderStage(const RecorderStage&) = delete;
   RecorderStage& operator=(const RecorderStage&) = delete;
 
  private:
   void Write(const std::string& channel, ByteView message, int64_t arrival_us);
+  // The run continues without a recording.
+  void GiveUp(const std::string& problem);
 
   StageContext& context_;
   LogFileWriter log_;
+  bool is_whole_ = true;
   int64_t time_us_ = 0;  // of the last event: time never runs back in a log
 };
 

@@ -84,6 +84,12 @@ def frames(text: str) -> tuple[int, int]:
     return first, last
 
 
+def seconds(text: str) -> float:
+    if not re.fullmatch(r"\d{1,9}(\.\d{1,9})?", text):
+        raise argparse.ArgumentTypeError(f"must be a number of seconds, not '{text}'")
+    return float(text)
+
+
 def sensor_and_source(text: str) -> tuple[str, str]:
     """`[SENSOR=]SOURCE` as (sensor, source); a source may hold `=` too."""
     sensor, equals, source = text.partition("=")

@@ -14,7 +14,7 @@ from pathlib import Path
 from nacl.signing import SigningKey
 
 from tessera_cli.errors import UserError
-from tessera_cli.files import write_text
+from tessera_cli.files import changed_by_others, write_private
 
 KEY_BYTES = 32
 OWN_NAME = "me"
@@ -93,6 +93,9 @@ class KeyRing:
     def _read(self) -> dict[str, bytes]:
         if not self.trusted_path.exists():
             return {}
+        for path in (self.trusted_path, self.trusted_path.parent):
+            if changed_by_others(path):
+                raise UserError(f"others can change {path}, so nobody is trusted; make it yours and: chmod go-w {path}")
         keys = {}
         for number, line in enumerate(self.trusted_path.read_text().splitlines(), start=1):
             words = line.partition("#")[0].split()
@@ -105,7 +108,8 @@ class KeyRing:
     def _write(self, keys: dict[str, bytes]) -> None:
         try:
             self.trusted_path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            write_text(self.trusted_path, "".join(f"{name} {to_text(key)}\n" for name, key in keys.items()))
+            rows = "".join(f"{name} {to_text(key)}\n" for name, key in keys.items())
+            write_private(self.trusted_path, rows.encode())
         except OSError as error:
             raise UserError(f"{self.trusted_path} can't be written: {error.strerror}.") from error
 

@@ -8,7 +8,6 @@ import hashlib
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ import psutil
 from tessera_cli.console import say
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.experiments.commands import CommandRunner
-from tessera_cli.files import BUILD, ROOT, absolute
+from tessera_cli.files import BUILD, ROOT, absolute, python_command
 from tessera_cli.interrupt import Interrupt
 
 # What a run consists of besides its Python sources; a change of any makes another program.
@@ -46,7 +45,7 @@ class Checkout:
     @property
     def words(self) -> list[str]:
         """The `tessera` command of this checkout, without its setup: nothing is built while runs are measured."""
-        return [sys.executable, "-m", "tessera_cli"]
+        return python_command("tessera_cli")
 
     @property
     def environment(self) -> dict[str, str]:

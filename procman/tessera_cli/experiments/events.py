@@ -1,6 +1,6 @@
 """When each process published what, read from the log of a run that was recorded (tessera run --record).
 
-    python -m tessera_cli.experiments.events LOG EVENTS.csv
+    python -P -m tessera_cli.experiments.events LOG EVENTS.csv
 
 is a process of its own, since messages must be decoded with the types of the build that made them: TESSERA_BUILD.
 Events are small, where the log holds every image; so it can be removed afterwards.
@@ -60,7 +60,7 @@ def read_log(path: Path) -> list[Event]:
     events = []
     for channel, data in lcm_bus.log_events(path):
         reader = READERS.get("TILE" if is_job(channel) else channel)
-        message = messages.decode_as(reader[0], data) if reader else None
+        message = messages.receive_as(reader[0], data) if reader else None
         if reader and message is not None and message.header.part == 0:
             header = message.header
             events.append(Event(channel, header.publisher, header.utime, *reader[1](message)))

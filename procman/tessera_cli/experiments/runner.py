@@ -15,7 +15,7 @@ from tessera_cli.experiments.checkouts import Checkout, cache_folder
 from tessera_cli.experiments.commands import CommandRunner
 from tessera_cli.experiments.plan import ExperimentFolder, PlannedRun, Sequence
 from tessera_cli.experiments.progress_view import Durations, ProgressView, time_left_s
-from tessera_cli.files import replacing, write_text
+from tessera_cli.files import python_command, replacing, write_text
 from tessera_cli.simulator import simulator_hash
 
 # From this share of all cores on, other programs disturb a run.
@@ -25,7 +25,7 @@ EVENTS = "events.csv"
 # Of a recorded run: enough for a map that has settled, and not too much for a disk.
 RECORDED_FRAMES = 240
 # The map of a run may have a hundred megabytes, and its hash is in the summary.
-NOT_KEPT = ("map.tessera", "map.ply", "run.lcmlog")
+NOT_KEPT = ("map.tessera", "map.ply", "run.lcmlog", "run.lcmlog.checksums")
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class ExperimentRunner:
     def _read_log(self, checkout: Checkout, name: str, path: Path) -> None:
         """By this checkout's code with the message types of the other's build."""
         here = self._here
-        words = [here.words[0], "-m", "tessera_cli.experiments.events", str(path / "run.lcmlog"), str(path / EVENTS)]
+        words = [*python_command("tessera_cli.experiments.events"), str(path / "run.lcmlog"), str(path / EVENTS)]
         environment = {**here.environment, "TESSERA_BUILD": str(checkout.build)}
         self._commands.run(name, words, here.folder, environment, self._view.look)
 

@@ -13,7 +13,7 @@ from tessera_cli.report.page import write_page
 from tessera_cli.report.svg import NUM_SERIES
 from tessera_cli.runs.run_folder import Result, Summary
 from tessera_cli.runs.trajectories import TrajectoryError, length_m
-from tessera_cli.settings import DEFAULTS_PATH, Settings
+from tessera_cli.settings import DEFAULTS_PATH, Settings, without_password
 
 NOTHING = "–"
 
@@ -178,4 +178,4 @@ def _flat(sections: Settings) -> dict[str, Any]:
 def _plain(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
-    return '""' if value == "" else str(value)
+    return '""' if value == "" else without_password(str(value))

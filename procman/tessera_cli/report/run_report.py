@@ -10,6 +10,7 @@ from tessera_cli.report.sentences import headline, remarks, strangers_sentence
 from tessera_cli.report.terminal_plot import draw_from_above
 from tessera_cli.report.trajectory_plot import plot_trajectory
 from tessera_cli.runs.run_folder import Result, Summary
+from tessera_cli.runs.summary import noting_if_not_written
 
 PICTURE_COLUMNS, PICTURE_LINES = 64, 24
 
@@ -17,7 +18,8 @@ PICTURE_COLUMNS, PICTURE_LINES = 64, 24
 def present_run(result: Result, folder: Path) -> str:
     """Writes picture and report into the run's folder. Returns the result in a few lines."""
     _write_pictures(result, folder)
-    return "\n".join([*_lines(result.summary), f"report: {folder / 'report.html'}"])
+    report = [f"report: {folder / 'report.html'}"] if (folder / "report.html").is_file() else []
+    return "\n".join([*_lines(result.summary), *report])
 
 
 def present_demo(result: Result, folder: Path) -> str:
@@ -25,7 +27,8 @@ def present_demo(result: Result, folder: Path) -> str:
     _write_pictures(result, folder)
     sentences = headline(result) + (remarks(result) if result.summary["ended"] != "complete" else [])
     files = [f"picture: {folder / 'trajectory.png'}", f"report:  {folder / 'report.html'}  (open it in a browser)"]
-    return "\n".join(["", *_picture(result), *sentences, "", *files])
+    warnings = [f"warning: {sentence}" for sentence in result.summary["not_written"]]
+    return "\n".join(["", *_picture(result), *sentences, *warnings, "", *files])
 
 
 def _write_pictures(result: Result, folder: Path) -> None:
@@ -33,8 +36,10 @@ def _write_pictures(result: Result, folder: Path) -> None:
     kind, _, place = summary["source"].partition(":")
     tracked = f"{summary['frames_tracked']} of {summary['frames']} frames tracked"
     title = f"{kind}:{place.rstrip('/').rpartition('/')[2]}, {summary['sensor']}: {tracked}"
-    plot_trajectory(result, title, folder / "trajectory.png")
-    write_report([result], folder / "report.html")
+    with noting_if_not_written(summary, "trajectory.png"):
+        plot_trajectory(result, title, folder / "trajectory.png")
+    with noting_if_not_written(summary, "report.html"):
+        write_report([result], folder / "report.html")
 
 
 def _picture(result: Result) -> list[str]:
@@ -77,7 +82,7 @@ def _lines(summary: Summary) -> list[str]:
     )
     if strangers := summary.get("messages_of_strangers"):
         lines.append(strangers_sentence(strangers))
-    return lines + [f"warning: {warning}" for warning in summary["warnings"]]
+    return lines + [f"warning: {warning}" for warning in summary["warnings"] + summary["not_written"]]
 
 
 def _describe_loop_checks(summary: Summary) -> str:

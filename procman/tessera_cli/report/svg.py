@@ -29,6 +29,7 @@ VARIABLES = {
 # Texts stay texts: readable for screen readers and searchable; the page gives them its font.
 STYLE: Any = {
     "svg.fonttype": "none",
+    "text.parse_math": False,  # a name may hold a $
     "font.size": 12,
     "axes.titlesize": 12,
     "axes.labelsize": 12,

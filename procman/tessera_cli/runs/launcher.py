@@ -31,6 +31,7 @@ from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summ
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.silence import SilenceWatch
 from tessera_cli.supervision.stack_monitor import StackMonitor, hear_heartbeats, is_of_this_machine
 from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.versions import tessera_version
@@ -141,6 +142,7 @@ class Launcher:
         self._monitor = StackMonitor(bus["main_url"], bus["channel_prefix"], deputy.owns, secret_of(values))
         self._interrupt = Interrupt()
         self._num_warnings_shown = 0
+        self._silence = SilenceWatch(lambda name: deputy.is_busy([name]))
         self._map_busy_at = 0.0  # monotonic seconds
 
     def run(self) -> int:
@@ -168,7 +170,8 @@ class Launcher:
             raise RunError(self._why_nothing_was_located(result.summary["frames"]))
         # A live source has no end of its own: to interrupt it is the ordinary way.
         said = result.summary["ended"]
-        return 0 if said == "complete" or (said == "interrupted" and self._source.is_live) else 1
+        ended_well = said == "complete" or (said == "interrupted" and self._source.is_live)
+        return 0 if ended_well and not result.summary["not_written"] else 1
 
     def _why_nothing_was_located(self, num_frames: int) -> str:
         said = f"no pose was found for any of {num_frames} frames"
@@ -236,6 +239,8 @@ class Launcher:
         for warning in self._deputy.warnings[self._num_warnings_shown :]:
             view.say(warning)
         self._num_warnings_shown = len(self._deputy.warnings)
+        for sentence in self._silence.step(self._monitor.progress.stages.values(), time.monotonic()):
+            view.say(sentence)
 
     def _check_stall(self) -> None:
         progress = self._monitor.progress
@@ -261,14 +266,27 @@ class Launcher:
             ended=ended,
             messages_undecodable=sum(report.undecodable for report in reports),
             messages_of_strangers=self._monitor.num_strangers + sum(report.strangers for report in reports),
+            not_written=self._missing_recording(),
         )
         process_facts = ProcessFacts(
             cpu_s={process.name: process.cpu_s for process in processes},
             max_rss_mb={process.name: process.max_rss_mb for process in processes},
             num_extractor_restarts=self._deputy.num_restarts("extractor"),
-            warnings=self._deputy.warnings,
+            warnings=self._deputy.warnings + self._silence.warnings + self._missing_frames(),
         )
         return write_summary(self._folder, run_facts, process_facts)
+
+    def _missing_frames(self) -> list[str]:
+        """What the camera says of a log that lacks messages."""
+        report = self._monitor.progress.stages.get("camera")
+        return [report.last_error] if report and self._source.kind == "log" and report.last_error else []
+
+    def _missing_recording(self) -> tuple[str, ...]:
+        """A sentence if the run was to be recorded and the log is not whole."""
+        if not self._arguments.record or (self._folder / "run.lcmlog").is_file():
+            return ()
+        report = self._monitor.progress.stages.get("recorder")
+        return ("the recording is not whole" + (f": {report.last_error}" if report and report.last_error else ""),)
 
     def _try_to_summarize(self, wall_s: float, sentence: str) -> None:
         """After a failure: of what there is, if there is anything."""

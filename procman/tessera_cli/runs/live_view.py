@@ -209,7 +209,7 @@ def _draw_stages(progress: Progress) -> Table:
     for heading in ("queue", "step ms", "CPU %", "MB", "errors"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in _stage_rows(progress):
-        table.add_row(*row)
+        table.add_row(*(Text(cell) for cell in row))  # texts as they are: in words, [red] would be a color
     return table
 
 

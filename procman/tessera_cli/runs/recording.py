@@ -50,11 +50,19 @@ def record(arguments: Namespace, source: Source, log: Path, keep_interrupted: bo
         num_frames = count_frames(written, channel_prefix_of(arguments.settings))
         if interrupt.requested and not keep_interrupted:
             raise KeyboardInterrupt
+        checksums_of(log).unlink(missing_ok=True)  # of an earlier log
         os.replace(written, log)
+        os.replace(checksums_of(written), checksums_of(log))
     finally:
         written.unlink(missing_ok=True)
+        checksums_of(written).unlink(missing_ok=True)
         _part(written).unlink(missing_ok=True)
     return num_frames
+
+
+def checksums_of(log: Path) -> Path:
+    """What the writer of a log puts beside it (modules/wire/log_file.h)."""
+    return log.with_name(f"{log.name}.checksums")
 
 
 def _part(log: Path) -> Path:

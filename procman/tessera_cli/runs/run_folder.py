@@ -6,6 +6,7 @@ Positions of `Result.estimate` are in the estimate's own world; `Result.in_truth
 import csv
 import datetime
 import json
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from tessera_cli.files import ROOT, absolute
 from tessera_cli.runs.sources import Source
 from tessera_cli.runs.trajectories import Trajectory, TrajectoryError, absolute_error, read_trajectory
 from tessera_cli.settings import Settings
+from tessera_cli.text import visible, visible_values
 
 # What a run leaves; files of an earlier run in the same folder must not be taken for its own.
 RUN_FILES = (
@@ -35,6 +37,7 @@ RUN_FILES = (
     "frames.csv",
     "loops.csv",
     "run.lcmlog",
+    "run.lcmlog.checksums",
     "settings.yaml",
 )
 LOOP_COLUMNS = ("keyframe_timestamp_s", "matched_timestamp_s", "inliers", "scale")
@@ -208,13 +211,16 @@ def _read_summary(path: Path) -> Summary:
     if not path.is_file():
         return {}
     try:
-        return json.loads(path.read_text())
+        return visible_values(json.loads(path.read_text()))
     except ValueError as error:
         raise UserError(f"{path}: is no JSON ({error}).") from error
 
 
 def read_settings(path: Path) -> Settings:
-    return yaml.safe_load(path.read_text()) or {} if path.is_file() else {}
+    """None if there is no such file, or if it is another user's, since only its owner can read it."""
+    if not os.access(path, os.R_OK):
+        return {}
+    return visible_values(yaml.safe_load(path.read_text()) or {})
 
 
 def _read_rows(path: Path) -> list[dict[str, str]]:
@@ -283,13 +289,13 @@ def read_log_warnings(folder: Path) -> list[str]:
     """For each process that logged warnings or errors: how many, and the first one."""
     found = []
     for path in sorted(folder.glob("*.log")):
-        lines = path.read_text(errors="replace").splitlines()
+        lines = path.read_text(errors="replace").split("\n")
         warnings = [line for line in lines if " warning: " in line or " error: " in line]
         warnings = [line for line in warnings if not _is_source_event(line)]
         if warnings:
             first = warnings[0].split(": ", 1)[1]
             count = f"{len(warnings)} {'problem' if len(warnings) == 1 else 'problems'}"
-            found.append(f"{path.stem} reported {count}, the first: {first}")
+            found.append(f"{path.stem} reported {count}, the first: {visible(first)}")
     return found
 
 

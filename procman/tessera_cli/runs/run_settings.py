@@ -3,9 +3,9 @@
 from argparse import Namespace
 from pathlib import Path
 
-from tessera_cli.cluster.keys import key_folder
 import yaml
 
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.constants import LIVE_FRAMES_IN_FLIGHT, MAP_SAVE_PERIOD_S
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT, absolute

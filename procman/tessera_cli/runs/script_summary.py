@@ -34,6 +34,7 @@ class ScriptWatcher:
         self._name, self._assignments, self._values = name, assignments, values
         self._monitor = ListMonitor(values["bus"]["main_url"], values["bus"]["channel_prefix"])
         self._usages: dict[tuple[str, int], ProcessUsage] = {}  # by process and number of its start
+        self.is_whole = True  # no file of the run that it has summed up is missing
         self._earlier_starts: dict[str, int] = {}  # before this run
         self.ended = ""  # as in summary.json; empty: nothing was summed up
         self._camera_at: float | None = None  # monotonic seconds
@@ -73,7 +74,9 @@ class ScriptWatcher:
         write_settings(self._assignments, folder / "settings.yaml")
         result = write_summary(folder, self._run_facts(folder), self._process_facts())
         self.ended = result.summary["ended"]
-        return present(result, folder)
+        words = present(result, folder)
+        self.is_whole = not result.summary["not_written"]
+        return words
 
     def _run_facts(self, folder: Path) -> RunFacts:
         extractors = {name for (name, _), usage in self._usages.items() if usage.command == "extractor"}

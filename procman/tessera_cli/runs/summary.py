@@ -1,7 +1,8 @@
 """summary.json of a run, from what the evaluator wrote and what its processes used."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from tessera_cli.constants import MAX_SCALE_SIGMA
 from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
 from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run, read_source_events
+from tessera_cli.settings import without_password
+from tessera_cli.text import visible_values
 from tessera_cli.versions import collect_versions
 
 # Frames with doubtful steps that are no farther apart belong to one stretch.
@@ -61,6 +64,7 @@ class RunFacts:
     ended: str  # "complete", "interrupted", or the sentence of a failure
     messages_undecodable: int
     messages_of_strangers: int  # that were passed over; each process counts what it hears
+    not_written: tuple[str, ...] = ()  # sentences about files that only the command knows of
 
 
 @dataclass(frozen=True)
@@ -74,11 +78,15 @@ class ProcessFacts:
 
 
 def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Result:
-    """Writes summary.json and returns the run with it. Raises RunError if the evaluator wrote nothing."""
+    """Writes summary.json and returns the run with it. Raises RunError if the evaluator wrote nothing.
+
+    A summary that can't be written is returned all the same, with a sentence in `not_written`, as for all other files.
+    """
     evaluated = _read_evaluation(folder)
+    not_written = [*evaluated.get("not_written", []), *facts.not_written]
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
     summary: Summary = {
-        "source": facts.source,
+        "source": without_password(facts.source),
         "sensor": facts.sensor,
         "extractors": facts.extractors,
         "tiles": facts.tiles,
@@ -98,9 +106,11 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         + drop_warnings(evaluated, result)
         + latency_warnings(result)
         + scale_warnings(result.frames, facts.sensor),
+        "not_written": not_written,
         "versions": collect_versions(),
     }
-    write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
+    with noting_if_not_written(summary, "summary.json"):
+        write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     return replace(result, summary=summary)
 
 
@@ -111,6 +121,8 @@ def judge_end(ended: str, evaluated: dict[str, Any]) -> str:
         return ended
     were = "frame is" if missing == 1 else "frames are"
     return f"incomplete: {missing} {were} not accounted for, of {evaluated['frames'] + missing} that the camera sent"
+
+
 def drop_warnings(evaluated: dict[str, Any], result: Result) -> list[str]:
     """How many frames did not reach the tracker, and why; empty if all did."""
     dropped, frames = evaluated["frames_dropped"], evaluated["frames"]
@@ -146,6 +158,15 @@ def latency_warnings(result: Result) -> list[str]:
 def _seconds_of_poses(frames: Frames | None) -> float:
     """From the first pose to the last, wall time; 0 if that is unknown."""
     return float(np.nansum(frames.pose_time_ms)) / 1000 if frames is not None else 0.0
+
+
+@contextmanager
+def noting_if_not_written(summary: Summary, name: str) -> Iterator[None]:
+    """Within it, the file of this name is written; if the system refuses that, `not_written` gets a sentence."""
+    try:
+        yield
+    except OSError as error:
+        summary["not_written"].append(f"{name} can't be written: {error.strerror or error}")
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
@@ -196,7 +217,7 @@ def _open_scale(frames: Frames, stretch: list[int]) -> str:
 
 def _read_evaluation(folder: Path) -> dict[str, Any]:
     try:
-        return json.loads((folder / "run.json").read_text())
+        return visible_values(json.loads((folder / "run.json").read_text()))
     except (OSError, ValueError) as error:
         log = folder / "stages" / "evaluator.log"
         raise RunError(f"the evaluator left no results in {folder}; {log} may say why.") from error

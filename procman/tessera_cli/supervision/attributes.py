@@ -116,7 +116,7 @@ ATTRIBUTES: dict[str, Reader] = {
     **OPTIONS,
 }
 # Attributes of a deputy's own command list; a process list must not decide about them.
-ONLY_LOCAL = ("folder", "environment")
+ONLY_LOCAL = ("folder", "environment", "writes")
 
 
 def read_attribute(attribute: Attribute, readers: Mapping[str, Reader]) -> Any:

@@ -1,6 +1,7 @@
 """A deputy's own list of what it executes: orders select from it by name, and nothing else is ever executed.
 
-It has the grammar of process lists, with other attributes: exec (the program and its arguments), folder, environment.
+It has the grammar of process lists, with other attributes: exec (the program and its arguments), folder,
+environment, and writes (folders in which the settings of orders may let processes write, besides the run's own).
 In exec, ${bin}, ${settings}, ${name} and ${id} stand for the folder of the built programs, the run's file of settings,
 and the process's name and number. Words are split before they are filled in, so that no value becomes two arguments.
 """
@@ -29,6 +30,7 @@ class LocalCommand:
     words: tuple[str, ...]  # program and arguments, with placeholders
     folder: Path  # working folder
     environment: dict[str, str] = field(default_factory=dict)  # added to the deputy's own
+    writes: tuple[Path, ...] = ()  # folders in which an order's settings may let it write (write_limits.py)
 
     def fill(self, values: dict[str, str]) -> list[str]:
         """The words to execute. `values`: of all placeholders."""
@@ -55,7 +57,7 @@ def _read_command(block: Block, folder: Path) -> LocalCommand:
     if block.kind != "cmd":
         raise block.place.error(f"a command list holds only cmd, not '{block.kind}'.")
     refuse([*block.blocks, *block.steps], 'a cmd holds only attributes such as exec = "PROGRAM ARGUMENTS";.')
-    readers = {"exec": _read_words, "folder": _read_folder, "environment": _read_environment}
+    readers = {"exec": _read_words, "folder": _read_folder, "environment": _read_environment, "writes": _read_folders}
     values = read_attributes(block, readers)
     if "exec" not in values:
         raise block.place.error(f'cmd "{block.name}" has no exec.')
@@ -76,6 +78,10 @@ def _read_words(text: str) -> tuple[str, ...]:
 def _read_folder(text: str) -> Path:
     folder = Path(text).expanduser()
     return folder if folder.is_absolute() else ROOT / folder
+
+
+def _read_folders(text: str) -> tuple[Path, ...]:
+    return tuple(_read_folder(word) for word in shlex.split(text))
 
 
 def _read_environment(text: str) -> dict[str, str]:

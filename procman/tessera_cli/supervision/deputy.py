@@ -43,6 +43,8 @@ from tessera_cli.supervision.signatures import sign
 from tessera_cli.supervision.state_folder import StateFolder
 from tessera_cli.supervision.supervisor import Supervisor
 from tessera_cli.supervision.wishes import run_of, to_launch
+from tessera_cli.supervision.write_limits import refuse_writing_elsewhere
+from tessera_cli.text import visible
 from tessera_cli.versions import tessera_version
 
 
@@ -174,8 +176,8 @@ class Deputy:
             if order.action == procman_order_t.RUN and order.wishes:
                 self._folder.keep_order(order.list, data)
         except (UserError, RunError, OSError) as error:
-            self._last_refusal = str(error)
-            say(f"order refused: {error}")
+            self._last_refusal = visible(str(error))
+            say(f"order refused: {self._last_refusal}")
         self._publish_status()
 
     def _resume(self) -> None:
@@ -188,7 +190,7 @@ class Deputy:
             try:
                 self._obey(order)
             except (UserError, RunError, OSError) as error:
-                say(f"order refused: {error}")
+                say(visible(f"order refused: {error}"))
 
     def _obey(self, order: procman_order_t) -> None:
         if order.action == procman_order_t.RUN:
@@ -246,6 +248,7 @@ class Deputy:
         run_dir = self._folder.run_dir(order.list)
         assignments = [*order.settings, f"bus.run_dir={run_dir.path if secret else ''}"]
         merged = settings.write_settings(assignments, self._folder.settings_path(run))
+        refuse_writing_elsewhere(merged, [path for command in self._commands.values() for path in command.writes])
         if secret:
             run_dir.make(secret)
         try:

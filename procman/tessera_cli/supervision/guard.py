@@ -1,6 +1,6 @@
 """Ends what a deputy leaves behind when it dies, for whatever reason.
 
-The guard is a process of its own: python -m tessera_cli.supervision.guard MARK. It waits until its standard input is
+The guard is a process of its own: python -P -m tessera_cli.supervision.guard MARK. It waits until its standard input is
 closed, whose other end the deputy holds: the kernel closes it when the deputy dies.
 """
 
@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 from tessera_cli.errors import RunError
-from tessera_cli.files import PROCMAN
+from tessera_cli.files import PROCMAN, python_command
 from tessera_cli.supervision.process_tree import kill_marked
 
 
@@ -26,7 +26,7 @@ class Guard:
 
     def _start(self) -> "subprocess.Popen[bytes]":
         return subprocess.Popen(
-            [sys.executable, "-m", "tessera_cli.supervision.guard", self._mark],
+            [*python_command("tessera_cli.supervision.guard"), self._mark],
             stdin=subprocess.PIPE,
             start_new_session=True,
             env={**os.environ, "PYTHONPATH": str(PROCMAN)},

@@ -107,6 +107,9 @@ class Progress:
             self.num_frames = int(report.values["num_frames"])
 
     def add_pose(self, pose: pose_t) -> None:
+        """One that was published before, by a tracker that has been started again, counts once."""
+        if pose.frame <= self.last_frame:
+            return
         now = time.monotonic()
         self.num_poses += 1
         self.last_frame = max(self.last_frame, pose.frame)

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from tessera_cli.errors import UserError
-from tessera_cli.files import replacing, write_text
+from tessera_cli.files import write_private, write_text
 from tessera_cli.membership import RunDir
 
 # Of the deputy's earlier lives, those that are remembered; and an epoch has 16 digits until the year 2286.
@@ -22,7 +22,9 @@ class LogFolder:
         self.path = path
         try:
             self.log_path("any").parent.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(path, os.O_RDONLY)  # never closed: the lock ends with this process
+            # Never closed: the lock ends with this process. Its file, unlike a folder, can't be opened by other users.
+            self._lock = os.open(path / ".lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
+            os.fchmod(self._lock, 0o600)
         except OSError as error:
             raise UserError(f"the folder {path} can't be used: {error.strerror}.") from error
         try:
@@ -42,6 +44,11 @@ class StateFolder(LogFolder):
     """Of a node's deputy."""
 
     def __init__(self, path: Path, deputy: str) -> None:
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            path.chmod(0o700)  # orders and logs may hold the password of a camera
+        except OSError as error:
+            raise UserError(f"the folder {path} can't be made this user's own: {error.strerror}.") from error
         super().__init__(
             path,
             f"a deputy with the id {deputy} and this port runs on this machine already: give --id NAME or --port N.",
@@ -79,8 +86,7 @@ class StateFolder(LogFolder):
         return epoch_us, earlier
 
     def keep_order(self, list_name: str, data: bytes) -> None:
-        with replacing(self.path / "orders" / list_name) as written:
-            written.write_bytes(data)
+        write_private(self.path / "orders" / list_name, data)
 
     def forget_orders(self, list_name: str) -> None:
         """Of all lists if the name is empty."""

@@ -17,6 +17,7 @@ from tessera_cli.messages import procman_process_t as states
 from tessera_cli.supervision.child_process import ChildProcess, Launch, describe_exit
 from tessera_cli.supervision.log_file import ProcessLog
 from tessera_cli.supervision.process_tree import Usage
+from tessera_cli.text import visible
 
 # A process that fails so often in a row has an error that restarts don't fix; auto_respawn = "always" never gives up.
 MAX_FAILURES_IN_A_ROW = 6
@@ -95,7 +96,7 @@ class SupervisedProcess:
     @property
     def last_line(self) -> str:
         """Of its output."""
-        return self._last_line.decode(errors="replace").strip() or "(it wrote nothing)"
+        return visible(self._last_line.decode(errors="replace").strip()) or "(it wrote nothing)"
 
     def on_stage_status(self, is_finished: bool, received_at: float) -> None:
         """Its stage reported that it runs."""

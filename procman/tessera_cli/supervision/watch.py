@@ -1,5 +1,6 @@
 """tessera watch: nodes, processes, the frame rate of each list and the output of processes, redrawn until Ctrl-C."""
 
+import re
 import sys
 import time
 from argparse import Namespace
@@ -22,6 +23,8 @@ from tessera_cli.supervision.sheriff_commands import describe_list, print_status
 from tessera_cli.supervision.supervised_process import STATE_NAMES
 
 NUM_LINES = 6
+# What deputies say is not signed: LCM would also write a file:// URL, and takes a channel for a regular expression.
+BUS, PREFIX = re.compile(r"udpm://[0-9.]+:[0-9]+(\?[a-z_0-9=&]*)?"), re.compile(r"[A-Za-z0-9_/-]{0,32}")
 STYLES = {
     procman_process_t.READY: "green",
     procman_process_t.FINISHED: "green",
@@ -61,6 +64,7 @@ class Watcher:
             (each.name, each.main_url, each.channel_prefix)
             for deputy in self._sheriff.deputies.values()
             for each in deputy.status.lists
+            if BUS.fullmatch(each.main_url) and PREFIX.fullmatch(each.channel_prefix)
         }
         self._monitors = {key: self._monitors.get(key) or ListMonitor(*key[1:]) for key in sorted(wanted)}
         self._sheriff.also_listen_to([monitor.bus for monitor in self._monitors.values()])
@@ -127,7 +131,7 @@ def _deputy_row(name: str, deputy: KnownDeputy) -> tuple[str | Text, ...]:
 
 def _process_row(process: procman_process_t, report: StageReport | None) -> tuple[str | Text, ...]:
     return (
-        f"    {process.name}",
+        Text(f"    {process.name}"),
         Text(STATE_NAMES.get(process.state, "?"), style=STYLES.get(process.state, "")),
         str(process.num_starts),
         str(report.queue) if report else "",

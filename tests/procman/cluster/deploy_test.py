@@ -5,7 +5,6 @@ import os
 import shutil
 import socket
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +26,7 @@ from tessera_cli.cluster.node_facts import (
     warnings,
 )
 from tessera_cli.errors import UserError
+from tessera_cli.files import python_command
 
 TOLD = """host board1
 architecture aarch64
@@ -201,7 +201,7 @@ def node(tmp_path: Path) -> Iterator[DeployTarget]:
 
     def run(*options: str) -> "subprocess.CompletedProcess[str]":
         return subprocess.run(
-            [sys.executable, "-m", "tessera_cli", "deploy", f"127.0.0.1:{folder}", "--ssh", sshd.command, *options],
+            [*python_command("tessera_cli"), "deploy", f"127.0.0.1:{folder}", "--ssh", sshd.command, *options],
             env=environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -278,7 +278,7 @@ def test_a_built_tree_runs_where_it_was_copied_to(node: DeployTarget) -> None:
 
 def test_nodes_that_cannot_be_reached_are_told(node: DeployTarget) -> None:
     finished = subprocess.run(
-        [sys.executable, "-m", "tessera_cli", "deploy", "127.0.0.1", "--ssh", "ssh -p 1"],
+        [*python_command("tessera_cli"), "deploy", "127.0.0.1", "--ssh", "ssh -p 1"],
         env=environment(),
         stdin=subprocess.DEVNULL,
         capture_output=True,

@@ -1,5 +1,6 @@
 """Keys: made when first needed, trusted, revoked; each error is told."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -40,3 +41,25 @@ def test_faults_of_keys_are_named(own_keys: Path) -> None:
     ring.secret_path.chmod(0o644)
     with pytest.raises(UserError, match="chmod 600"):
         ring.signing_key()
+
+
+def test_keys_that_others_can_change_are_not_trusted(own_keys: Path) -> None:
+    ring = KeyRing(own_keys)
+    assert list(ring.trusted()) == ["me"]
+    assert ring.trusted_path.stat().st_mode & 0o777 == 0o600
+    for path, mode in ((ring.trusted_path, 0o620), (ring.trusted_path, 0o602), (own_keys, 0o777)):
+        before = path.stat().st_mode
+        path.chmod(mode)
+        with pytest.raises(UserError, match=f"others can change {path}, .*chmod go-w {path}"):
+            ring.trusted()
+        path.chmod(before)
+    assert list(ring.trusted()) == ["me"]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_keys_that_belong_to_others_are_not_trusted(own_keys: Path) -> None:
+    ring = KeyRing(own_keys)
+    ring.trusted()
+    os.chown(ring.trusted_path, 65534, -1)
+    with pytest.raises(UserError, match="others can change"):
+        ring.trusted()

@@ -69,6 +69,8 @@ def test_complete_means_that_every_frame_is_accounted_for() -> None:
     )
     assert "40 frames are not" in judge_end("complete", {"frames": 20, "frames_missing": 40})
     assert judge_end("interrupted", {"frames": 20, "frames_missing": 40}) == "interrupted"
+
+
 def _live_result(latency_ms: np.ndarray, source: str = "kitti:/x", newest_wins: bool = True) -> Result:
     """Poses of 161 of 200 frames of a camera at 10 Hz."""
     numbers = np.linspace(0, 200, len(latency_ms)).astype(int)

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
@@ -17,9 +18,12 @@ from helpers.nodes import MakeNode
 from helpers.orders import KEY, bad_order
 from helpers.stack import environment, read_line, wait_for
 from tessera_cli.cluster.keys import KeyRing, to_text
+from tessera_cli.errors import RunError
 from tessera_cli.lcm_bus import bus_url
 from tessera_cli.messages import procman_order_t, procman_status_t
 from tessera_cli.supervision.orders import OrderVerifier
+from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.sheriff import Sheriff
 from tessera_cli.supervision.signatures import sign
 
 KEYS = (sys.executable, "-m", "tessera_cli", "keys")
@@ -175,6 +179,51 @@ def test_bad_settings_are_refused_before_anything_starts(make_node: MakeNode) ->
     up = node.up("settings { tracker.wings = 2; }" + listed("sleeper"))
     assert up.returncode == 2 and "wings" in up.stderr
     assert node.processes() == {}
+
+
+def test_a_setting_with_a_nul_is_refused_and_the_deputy_lives_on(make_node: MakeNode) -> None:
+    """Signed by a key that the deputy trusts: the command itself lets no such setting through."""
+    node = make_node(COMMANDS).start()
+    sheriff = Sheriff(Namespace(port=node.port, lan=False))
+    sheriff.discover_deputies()
+    list_path = node.folder / "list.pmd"
+    list_path.write_text(listed("sleeper"))
+    processes = list(read_process_list(list_path, {}).processes.values())
+    with pytest.raises(RunError, match=r"node1 refuses: the setting camera.source=a\\x00b holds a control character"):
+        sheriff.run("node1", "list", processes, ["camera.source=a\0b"], "a session")
+    assert node.processes() == {}
+
+
+@pytest.mark.parametrize(
+    "settings, words",
+    [
+        ("recorder.path = /tmp/elsewhere/x.lcmlog; ", "not in the run's folder"),
+        ("recorder.path = ${out}/../x.lcmlog; ", "not in the run's folder"),
+        ("evaluator.save_map = ${link}/authorized_keys; ", "not in the run's folder"),
+        ("map_writer.path = map.ply; ", "not in the run's folder"),
+        ("evaluator.out_dir = /tmp/.config/autostart; ", "must not be hidden"),
+        ("bus.work_url = file:///tmp/x?mode=w; ", "must be udpm://"),
+    ],
+)
+def test_an_order_writes_nowhere_but_in_the_runs_folder(make_node: MakeNode, settings: str, words: str) -> None:
+    node = make_node(COMMANDS).start()
+    out = node.folder / "out"
+    out.mkdir()
+    (out / "link").symlink_to(Path.home())
+    settings = settings.replace("${out}", str(out)).replace("${link}", str(out / "link"))
+    options = [word for each in settings.split(";") if each.strip() for word in ("--set", each.replace(" ", ""))]
+    up = node.up(listed("sleeper"), *(() if "out_dir" in settings else ("--out", out)), *options)
+    assert up.returncode == 1 and words in up.stderr, up.stderr
+    assert node.processes() == {}
+
+
+def test_the_deputys_own_list_allows_more_folders(make_node: MakeNode, tmp_path: Path) -> None:
+    allowed = tmp_path / "recordings"
+    node = make_node(COMMANDS + f'cmd "writer" {{ exec = "sleep 1"; writes = "{allowed}"; }}').start()
+    inside = node.up(listed("sleeper"), "--out", tmp_path / "out", "--set", f"recorder.path={allowed}/x.lcmlog")
+    assert inside.returncode == 0, inside.stderr
+    beside = node.up(listed("sleeper"), "--out", tmp_path / "out", "--set", f"recorder.path={allowed}2/x.lcmlog")
+    assert beside.returncode == 1 and f'writes = "{allowed}2"' in beside.stderr
 
 
 def test_a_host_without_a_deputy_and_a_second_deputy_with_one_id_are_told(make_node: MakeNode) -> None:

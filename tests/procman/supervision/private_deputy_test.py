@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -21,7 +22,7 @@ from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import Process, read_process_list
 from tessera_cli.supervision.process_tree import marked
 from tessera_cli.supervision.progress import FINISHED, RUNNING, StageReport
-from tessera_cli.supervision.state_folder import LogFolder
+from tessera_cli.supervision.state_folder import LogFolder, StateFolder
 from tessera_cli.supervision.supervised_process import STATE_NAMES
 
 COMMANDS = """
@@ -216,6 +217,49 @@ def test_a_folder_belongs_to_one_deputy_at_a_time(tmp_path: Path) -> None:
     first = LogFolder(tmp_path / "logs", "it is taken.")
     with pytest.raises(UserError, match="it is taken"):
         LogFolder(first.path, "it is taken.")
+
+
+TAKES_FOLDER = """
+import sys
+from pathlib import Path
+from tessera_cli.supervision.state_folder import LogFolder
+LogFolder(Path(sys.argv[1]), "it is taken.")
+"""
+OTHER_USER = """
+import fcntl, os, sys
+os.setgroups([])
+os.setuid(65534)
+kept = []
+for path in (sys.argv[1], sys.argv[1] + "/.lock"):
+    try:
+        kept.append(os.open(path, os.O_RDONLY))
+        fcntl.flock(kept[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+        print("holds", os.path.basename(path), flush=True)
+    except OSError as error:
+        print(error.strerror, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can act for another user")
+def test_no_other_user_can_keep_a_folder_from_its_owner() -> None:
+    with tempfile.TemporaryDirectory() as top:
+        Path(top).chmod(0o755)
+        folder = Path(top) / "logs"
+        take = [sys.executable, "-c", TAKES_FOLDER, str(folder)]
+        subprocess.run(take, env=environment(), check=True)
+        words = ["/usr/bin/python3", "-I", "-c", OTHER_USER, str(folder)]
+        with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+            assert read_line(other) == "holds logs\n"
+            assert read_line(other) == "Permission denied\n"
+            subprocess.run(take, env=environment(), check=True)
+
+
+def test_only_the_owner_reads_a_deputys_folder(tmp_path: Path) -> None:
+    folder = StateFolder(tmp_path / "state", "node1")
+    folder.keep_order("list", b"order")
+    assert folder.path.stat().st_mode & 0o777 == 0o700
+    assert (folder.path / "orders" / "list").stat().st_mode & 0o777 == 0o600
 
 
 KILLED = """

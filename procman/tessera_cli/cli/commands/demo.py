@@ -78,7 +78,7 @@ def log_name(num_frames: int) -> str:
 
 def _render(log: Path, num_frames: int) -> None:
     from tessera_cli.cli.main import parse_arguments
-    from tessera_cli.runs.recording import record
+    from tessera_cli.runs.recording import checksums_of, record
     from tessera_cli.runs.sources import parse_source
 
     source = f"sim:{SCENE}"
@@ -89,3 +89,4 @@ def _render(log: Path, num_frames: int) -> None:
         if not stale.name.endswith(f"-{simulator_hash()}.lcmlog"):
             say(f"removing {stale.name}, which was rendered by an older simulator")
             stale.unlink()
+            checksums_of(stale).unlink(missing_ok=True)

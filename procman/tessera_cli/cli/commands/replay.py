@@ -13,12 +13,23 @@ def add_parser(commands: Commands) -> None:
         "replay",
         main,
         "The whole stack, fed by a recorded LCM log.",
-        "examples:\n  procman/tessera replay logs/drive.lcmlog --extractors 2\n",
+        "examples:\n  procman/tessera replay logs/drive.lcmlog --extractors 2\n"
+        "  procman/tessera replay logs/drive/run.lcmlog --only tracker\n",
     )
     parser.add_argument("log", metavar="LOG")
+    parser.add_argument(
+        "--only",
+        metavar="STAGE",
+        help="only this stage of a run that was recorded (run --record) gets what it got then; the first message in "
+        "which it says something else is named",
+    )
     add_run_options(parser)
 
 
 def main(arguments: Namespace) -> int:
+    if arguments.only:
+        from tessera_cli.runs.stage_replay import replay_stage
+
+        return replay_stage(arguments)
     arguments.source = f"log:{arguments.log}"
     return run.main(arguments)
