@@ -15,9 +15,9 @@ from tessera_cli.errors import RunError
 from tessera_cli.messages import decode, header_t
 
 
-def bus_url(port: int, time_to_live: int = 0) -> str:
+def bus_url(port: int, time_to_live: int = 0, group: str = MULTICAST_GROUP) -> str:
     """`time_to_live` 0: multicast that stays on this machine."""
-    return f"udpm://{MULTICAST_GROUP}:{port}?ttl={time_to_live}"
+    return f"udpm://{group}:{port}?ttl={time_to_live}"
 
 
 def is_on_lan(arguments: Namespace) -> bool:

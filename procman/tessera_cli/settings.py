@@ -6,7 +6,14 @@ from typing import Any
 
 import yaml
 
-from tessera_cli.constants import FIRST_TILE_PORT_OFFSET, LAN_MESSAGE_BYTES, MULTICAST_GROUP, PORT_OFFSETS
+from tessera_cli.constants import (
+    FIRST_TILE_PORT_OFFSET,
+    LAN_GROUPS,
+    LAN_MESSAGE_BYTES,
+    LAN_TILE_GROUP,
+    MULTICAST_GROUP,
+    PORT_OFFSETS,
+)
 from tessera_cli.errors import UserError
 from tessera_cli.files import BIN, ROOT
 from tessera_cli.lcm_bus import bus_url
@@ -18,12 +25,13 @@ Settings = dict[str, dict[str, Any]]  # sections of keys
 
 def network_assignments(port: int, on_lan: bool) -> list[str]:
     """The buses of a stack with this base port; `on_lan`: their messages leave this machine."""
+    groups = LAN_GROUPS if on_lan else dict.fromkeys(LAN_GROUPS, MULTICAST_GROUP)
     assignments = [
-        f"bus.{bus}_url={bus_url(port + PORT_OFFSETS[bus], int(on_lan))}" for bus in ("main", "camera", "work")
+        f"bus.{bus}_url={bus_url(port + PORT_OFFSETS[bus], int(on_lan), group)}" for bus, group in groups.items()
     ]
     assignments.append(f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}")
     if on_lan:
-        tile_url = f"udpm://{MULTICAST_GROUP}:{{port}}?ttl=1"
+        tile_url = f"udpm://{LAN_TILE_GROUP}:{{port}}?ttl=1"
         assignments += [f"bus.tile_url={tile_url}", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
     return assignments
 
