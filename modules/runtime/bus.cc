@@ -58,6 +58,8 @@ std::string UrlOf(const Channel& channel, const Settings& settings) {
       return bus.camera_url;
     case BusKind::kWork:
       return bus.work_url;
+    case BusKind::kMap:
+      return bus.map_url.empty() ? bus.main_url : bus.map_url;
     case BusKind::kTile:
       break;
   }

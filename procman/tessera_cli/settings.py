@@ -8,15 +8,12 @@ import yaml
 
 from tessera_cli.constants import (
     FIRST_TILE_PORT_OFFSET,
-    LAN_GROUPS,
     LAN_MESSAGE_BYTES,
     LAN_TILE_GROUP,
-    MULTICAST_GROUP,
-    PORT_OFFSETS,
 )
 from tessera_cli.errors import UserError
 from tessera_cli.files import BIN, ROOT
-from tessera_cli.lcm_bus import bus_url
+from tessera_cli.lcm_bus import stack_bus_url
 
 DEFAULTS_PATH = ROOT / "config" / "default.yaml"
 
@@ -25,13 +22,11 @@ Settings = dict[str, dict[str, Any]]  # sections of keys
 
 def network_assignments(port: int, on_lan: bool) -> list[str]:
     """The buses of a stack with this base port; `on_lan`: their messages leave this machine."""
-    groups = LAN_GROUPS if on_lan else dict.fromkeys(LAN_GROUPS, MULTICAST_GROUP)
-    assignments = [
-        f"bus.{bus}_url={bus_url(port + PORT_OFFSETS[bus], int(on_lan), group)}" for bus, group in groups.items()
-    ]
+    assignments = [f"bus.{bus}_url={stack_bus_url(bus, port, on_lan)}" for bus in ("main", "camera", "work")]
     assignments.append(f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}")
     if on_lan:
         tile_url = f"udpm://{LAN_TILE_GROUP}:{{port}}?ttl=1"
+        assignments.append("bus.map_url=" + stack_bus_url("map", port, on_lan))
         assignments += [f"bus.tile_url={tile_url}", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
     return assignments
 
