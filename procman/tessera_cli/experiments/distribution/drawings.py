@@ -50,7 +50,7 @@ def draw_scaling(outcome: Outcome, prefix: str) -> Drawing | None:
     if one := outcome.cell(1, "1x1"):
         ends = np.array([1, outcome.extractors[-1]])
         ideal = ends * one.median(lambda run: run.poses_per_s)
-        axes.plot(ends, ideal, color=INK, linestyle=(0, (4, 3)), linewidth=1, label="ideal", scalex=False)
+        axes.plot(ends, ideal, color=INK, linestyle=(0, (4, 3)), linewidth=1, label="ideal")
     _count_extractors(axes, outcome)
     axes.set(ylabel="poses per second", ylim=(0, None))
     add_legend(figure, 3)
@@ -61,9 +61,7 @@ def draw_scaling(outcome: Outcome, prefix: str) -> Drawing | None:
 
 
 def _count_extractors(axes: Axes, outcome: Outcome) -> None:
-    axes.set_xscale("log", base=2)
-    axes.set_xticks(outcome.extractors, [str(number) for number in outcome.extractors])
-    axes.minorticks_off()
+    axes.set_xticks(outcome.extractors)
     axes.set(xlabel="extractors P")
 
 

@@ -37,7 +37,7 @@ from tessera_cli.experiments.distribution.nodes import Nodes
 from tessera_cli.experiments.distribution.outcome import CALIBRATION, Outcome, read_outcome
 from tessera_cli.experiments.distribution.page import headline, write_distribution_page
 from tessera_cli.experiments.distribution.runs import Job, StackRunner, extractor_step_ms, read_traffic
-from tessera_cli.experiments.distribution.tables import as_csv, as_json, print_outcome
+from tessera_cli.experiments.distribution.tables import as_csv, as_json, as_markdown, print_outcome
 from tessera_cli.experiments.plan import (
     ExperimentFolder,
     PlannedRun,
@@ -202,11 +202,12 @@ def _present(folder: ExperimentFolder, runs: list[PlannedRun]) -> int:
     page = folder.path / f"{name}.html"
     write_text(folder.path / f"{name}.json", json.dumps(as_json(outcome, claims, remarks), indent=2) + "\n")
     write_text(folder.path / f"{name}.csv", as_csv(outcome))
+    write_text(folder.path / f"{name}.md", as_markdown(outcome))
     write_distribution_page(page, [outcome], remarks)
     print_outcome(outcome, claims)
     for sentence in [headline(claims), *remarks]:
         print(sentence)
-    print(f"page: {page}, tables as {name}.json and {name}.csv beside it")
+    print(f"page: {page}, tables as {name}.json, {name}.csv and {name}.md beside it")
     is_sound = len(outcome.hashes) == 1 and not any(
         run.failures for cell in outcome.cells.values() for run in cell.runs
     )

@@ -9,6 +9,7 @@ from typing import Self
 
 import psutil
 
+from tessera_cli.cluster.keys import KeyRing
 from tessera_cli.errors import RunError
 from tessera_cli.experiments.checkouts import Checkout
 from tessera_cli.experiments.distribution.cpu_groups import CpuGroups
@@ -65,6 +66,7 @@ class Nodes:
         self._folder.mkdir(parents=True, exist_ok=True)
         self._guard = Guard(f"{self._folder}/")
         try:
+            KeyRing(self._folder / "keys").trusted()  # made once, before several deputies look for it
             if self._groups:
                 write_text(self._commands_path, slow_commands(SHIPPED_LIST.read_text(), self._groups))
             for host in self._lan.hosts:

@@ -139,6 +139,17 @@ def print_outcome(outcome: Outcome, claims: list[Claim]) -> None:
         console.print(claim.sentence, markup=False, highlight=False)
 
 
+def as_markdown(outcome: Outcome) -> str:
+    """The tables, for documents such as procman/EXPERIMENTS.md."""
+    parts = []
+    for grid in make_grids(outcome):
+        heading = ["cut", *(f"P = {number}" for number in grid.columns)]
+        rows = [heading, ["---"] * len(heading), *([tiles, *texts] for tiles, texts in grid.rows)]
+        table = "".join(f"| {' | '.join(row)} |\n" for row in rows)
+        parts.append(f"**{grid.title}.** {grid.note}\n\n{table}")
+    return "\n".join(parts)
+
+
 # Columns of the CSV file: what each run has besides its configuration.
 COLUMNS: dict[str, Callable[[Figures], Any]] = {
     "tracking_failures": lambda run: run.failures,

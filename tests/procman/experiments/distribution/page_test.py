@@ -16,7 +16,7 @@ from tessera_cli.experiments.distribution.experiment import compare_distribution
 from tessera_cli.experiments.distribution.grid import HETEROGENEOUS, HOMOGENEOUS, SINGLE
 from tessera_cli.experiments.distribution.outcome import read_outcome
 from tessera_cli.experiments.distribution.page import PICTURES, write_distribution_page
-from tessera_cli.experiments.distribution.tables import as_csv, as_json, make_grids, print_outcome
+from tessera_cli.experiments.distribution.tables import as_csv, as_json, as_markdown, make_grids, print_outcome
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +66,12 @@ def test_every_run_is_a_row_of_the_csv_file(folder: Path) -> None:
     assert len(rows) == 11
     assert {row["variant"] for row in rows} == {"", "alone", "killed", "loss"}
     assert all(row["trajectory_sha256"] == "ab" * 32 for row in rows)
+
+
+def test_documents_get_the_same_tables(folder: Path) -> None:
+    text = as_markdown(read_outcome(folder))
+    assert "| cut | P = 1 | P = 4 |\n| --- | --- | --- |\n| 1x1 |" in text
+    assert "**Tracking failures – RMS error [m].**" in text
 
 
 def test_json_holds_bytes_of_each_link(folder: Path) -> None:
