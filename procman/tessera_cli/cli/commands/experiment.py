@@ -34,8 +34,8 @@ runs --repetitions times as fast as it goes, once with one frame at a time (late
 in the middle: a host that is killed and comes back, and 2 % of the packets lost. All must give the same trajectory
 and map.
 
-The folder holds each run, the tables as {name}.json, .csv and .md, {name}.html, and its pictures. An experiment that was
-interrupted continues where it stopped when the same command is given again with its --out.
+The folder holds each run, the tables as {name}.json, .csv and .md, {name}.html, and its pictures. An experiment that
+was interrupted continues where it stopped when the same command is given again with its --out.
 
 Exit status: 0 measured; 1 a run failed, lost track or gave another result; 2 the arguments are wrong.
 
