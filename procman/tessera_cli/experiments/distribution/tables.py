@@ -42,11 +42,11 @@ def make_grids(outcome: Outcome) -> list[Grid]:
             outcome, "Tracking failures – RMS error [m]", "All repetitions together; median of the error.", _failures
         ),
         _grid(outcome, "Poses per second", "Median over the repetitions; in brackets: times one extractor.", _speed),
-        _grid(outcome, "Time between poses [ms]", "Mean, 95 % below, standard deviation.", _pose_times),
+        _grid(outcome, "Time between poses [ms]", "Mean / 95 % below / standard deviation.", _pose_times),
         _grid(
             outcome,
             "Latency of a frame that waits for no other [ms]",
-            "Median, 95 % below; one frame at a time. More extractors than tiles are of no use to it.",
+            "Median / 95 % below; one frame at a time. More extractors than tiles are of no use to it.",
             _latency,
             ALONE,
         ),
@@ -83,12 +83,12 @@ def _speed(outcome: Outcome, cell: Cell) -> str:
 
 def _pose_times(_outcome: Outcome, cell: Cell) -> str:
     times = np.concatenate([run.pose_times_ms for run in cell.runs])
-    return f"{np.mean(times):.0f}, {np.percentile(times, 95):.0f}, {np.std(times):.0f}"
+    return f"{np.mean(times):.0f}/{np.percentile(times, 95):.0f}/{np.std(times):.0f}"
 
 
 def _latency(_outcome: Outcome, cell: Cell) -> str:
     times = np.concatenate([run.latencies_ms for run in cell.runs])
-    return f"{np.median(times):.0f}, {np.percentile(times, 95):.0f}"
+    return f"{np.median(times):.0f}/{np.percentile(times, 95):.0f}"
 
 
 def _cpu(_outcome: Outcome, cell: Cell) -> str:
