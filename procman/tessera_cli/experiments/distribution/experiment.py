@@ -140,6 +140,9 @@ class _Series:
     def carry_out(self, runs: list[PlannedRun], most: int, checkout: Checkout, commands: CommandRunner) -> None:
         """`most`: extractors at once."""
         self.runs = runs
+        if all(self._folder.summary(run) for run in runs):
+            self._view.say("all runs are there already")
+            return
         with ExitStack() as stack:
             lan = stack.enter_context(Lan(self._experiment.link_rates_mbit(most)))
             groups = stack.enter_context(CpuGroups(most)) if self._experiment.is_slow else None
