@@ -43,9 +43,9 @@ def _failures(outcome: Outcome) -> Claim:
 
 def _one_hash(outcome: Outcome) -> Claim:
     runs = sum(len(cell.runs) for cell in outcome.cells.values())
-    hashes = outcome.hashes
-    measured = f"{runs} runs, {len(hashes)} different {'result' if len(hashes) == 1 else 'results'}"
-    return Claim("one trajectory and one map, bit for bit", measured, len(hashes) == 1)
+    results = len(outcome.hashes)
+    measured = f"{runs} runs, all equal" if results == 1 else f"{runs} runs, {results} different results"
+    return Claim("one trajectory and one map, bit for bit", measured, results == 1)
 
 
 def _speed(cell: Cell | None) -> float:

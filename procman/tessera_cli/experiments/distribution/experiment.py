@@ -35,7 +35,7 @@ from tessera_cli.experiments.distribution.grid import (
 from tessera_cli.experiments.distribution.lan import Lan, require_root
 from tessera_cli.experiments.distribution.nodes import Nodes
 from tessera_cli.experiments.distribution.outcome import CALIBRATION, Outcome, read_outcome
-from tessera_cli.experiments.distribution.page import headline, write_distribution_page
+from tessera_cli.experiments.distribution.page import headline, write_distribution_page, write_pictures
 from tessera_cli.experiments.distribution.runs import Job, StackRunner, extractor_step_ms, read_traffic
 from tessera_cli.experiments.distribution.tables import as_csv, as_json, as_markdown, print_outcome
 from tessera_cli.experiments.plan import (
@@ -56,6 +56,7 @@ from tessera_cli.interrupt import Interrupt
 
 STANDARD = [Sequence("KITTI 03", "mono", "kitti:kitti/sequences/03"), Sequence("street", "mono", "sim:street")]
 CALIBRATION_FRAMES = 20
+PICTURES = "pictures"
 
 
 def measure_distribution(arguments: Namespace, experiment: Experiment) -> int:
@@ -206,7 +207,7 @@ def _present(folder: ExperimentFolder, runs: list[PlannedRun]) -> int:
     write_text(folder.path / f"{name}.json", json.dumps(as_json(outcome, claims, remarks), indent=2) + "\n")
     write_text(folder.path / f"{name}.csv", as_csv(outcome))
     write_text(folder.path / f"{name}.md", as_markdown(outcome))
-    write_distribution_page(page, [outcome], remarks)
+    write_pictures(folder.path / PICTURES, write_distribution_page(page, [outcome], remarks))
     print_outcome(outcome, claims)
     for sentence in [headline(claims), *remarks]:
         print(sentence)
@@ -241,6 +242,7 @@ def compare_distributions(arguments: Namespace) -> int:
         raise UserError(f"{arguments.first} and {arguments.second} are the same experiment.")
     out = absolute(arguments.out) if arguments.out else Path.cwd() / "comparison.html"
     remarks = _differences(outcomes)
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_distribution_page(out, outcomes, remarks)
     for outcome in outcomes:
         print(f"{outcome.name}: {outcome.experiment.summary}")

@@ -1,4 +1,4 @@
-"""The page of one distribution experiment, or of two beside each other, and its pictures as files."""
+"""The page of one distribution experiment, or of two beside each other, and its figures as files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +13,9 @@ from tessera_cli.report.page import page_style, write_page
 from tessera_cli.report.svg import drawing_style, standalone
 from tessera_cli.versions import collect_versions
 
-PICTURES = "pictures"
 
-
-def write_distribution_page(path: Path, outcomes: Sequence[Outcome], remarks: list[str]) -> None:
-    """Also each figure as a file of its own, in the folder PICTURES beside the page."""
+def write_distribution_page(path: Path, outcomes: Sequence[Outcome], remarks: list[str]) -> list[Drawing]:
+    """Returns its figures."""
     with drawing_style():
         drawings = draw_all(outcomes)
     names = [outcome.name for outcome in outcomes]
@@ -38,7 +36,7 @@ def write_distribution_page(path: Path, outcomes: Sequence[Outcome], remarks: li
         drawings=drawings,
         versions=collect_versions(),
     )
-    write_pictures(path.parent / PICTURES, drawings)
+    return drawings
 
 
 def headline(claims: list[Claim]) -> str:
@@ -52,6 +50,7 @@ def _note(outcome: Outcome) -> str:
 
 
 def write_pictures(folder: Path, drawings: list[Drawing]) -> None:
+    """Each as a file of its own, for documents."""
     folder.mkdir(parents=True, exist_ok=True)
     for drawing in drawings:
         name = "".join(letter if letter.isalnum() else "-" for letter in drawing.title.lower()).strip("-")

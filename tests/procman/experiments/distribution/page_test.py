@@ -15,7 +15,7 @@ from tessera_cli.experiments.distribution.claims import check_claims
 from tessera_cli.experiments.distribution.experiment import compare_distributions
 from tessera_cli.experiments.distribution.grid import HETEROGENEOUS, HOMOGENEOUS, SINGLE
 from tessera_cli.experiments.distribution.outcome import read_outcome
-from tessera_cli.experiments.distribution.page import PICTURES, write_distribution_page
+from tessera_cli.experiments.distribution.page import write_distribution_page, write_pictures
 from tessera_cli.experiments.distribution.tables import as_csv, as_json, as_markdown, make_grids, print_outcome
 
 
@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def page(folder: Path) -> Page:
     path = folder / "heterogeneous.html"
-    write_distribution_page(path, [read_outcome(folder)], ["A remark <b>."])
+    write_pictures(folder / "pictures", write_distribution_page(path, [read_outcome(folder)], ["A remark <b>."]))
     return Page(path)
 
 
@@ -92,7 +92,7 @@ def test_every_figure_is_told_in_words_and_is_a_small_file_too(page: Page, folde
     svgs = [svg for figure in page.root.all("figure") for svg in figure.all("svg")]
     assert len(page.root.all("figure")) == 6
     assert all(len(svg.attributes["aria-label"].split()) > 5 for svg in svgs)
-    pictures = sorted((folder / PICTURES).glob("*.svg"))
+    pictures = sorted((folder / "pictures").glob("*.svg"))
     assert len(pictures) == 6
     for picture in pictures:
         assert picture.stat().st_size < 60_000 and "var(--" not in picture.read_text()
@@ -102,10 +102,10 @@ def test_two_experiments_lie_beside_each_other(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     other = write_experiment(tmp_path / "fast", HOMOGENEOUS)
-    arguments = Namespace(first=str(folder), second=str(other), out=str(tmp_path / "both.html"))
+    arguments = Namespace(first=str(folder), second=str(other), out=str(tmp_path / "new" / "both.html"))
     assert compare_distributions(arguments) == 0
     assert "bit for bit" in capsys.readouterr().out
-    words = " ".join(Page(tmp_path / "both.html").root.words().split())
+    words = " ".join(Page(tmp_path / "new" / "both.html").root.words().split())
     assert "slow and fast, beside each other" in words
     with pytest.raises(UserError, match="the same experiment"):
         compare_distributions(Namespace(first=str(folder), second=str(folder), out=None))
