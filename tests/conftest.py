@@ -1,17 +1,15 @@
 """Fixtures of the Python tests."""
 
-import os
-import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from helpers.namespaces import Lan
 from helpers.nodes import FIRST_NODE_PORT, PORTS_PER_NODE, MakeNode, Node
 from helpers.stack import NUM_FRAMES, Finished, Tessera
 from helpers.synthetic_sequence import write_sequence
+from tessera_cli.errors import RunError, UserError
+from tessera_cli.experiments.distribution.lan import Lan, require_root
 
 
 @pytest.fixture(autouse=True)
@@ -70,13 +68,9 @@ def make_node(tmp_path: Path, own_keys: Path) -> Iterator[MakeNode]:
 @pytest.fixture
 def lan() -> Iterator[Lan]:
     """Four nodes that share nothing but packets."""
-    if os.geteuid() != 0 or not shutil.which("ip"):
-        pytest.skip("network namespaces need root and iproute2")
-    made = Lan(4)
     try:
-        made.make()
-    except subprocess.CalledProcessError as error:
-        made.remove()
-        pytest.skip(f"this machine makes no network namespaces: {error.stderr.strip()}")
-    yield made
-    made.remove()
+        require_root("a test of nodes")
+        with Lan([None] * 4) as made:
+            yield made
+    except (UserError, RunError) as error:
+        pytest.skip(str(error))

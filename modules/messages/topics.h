@@ -19,9 +19,10 @@ namespace tessera {
 // Each bus is one LCM multicast group and port. A process receives a copy of everything on a bus it listens to, so
 // pixels and candidates have buses of their own.
 enum class BusKind {
-  kMain,    // everything small; FEATURES. All processes listen. The stock tools' default
+  kMain,    // everything small. All processes listen. The stock tools' default
   kCamera,  // CAMERA. Only the dispatcher and the recorder listen
   kWork,    // TILE_FEATURES. Only the reassembler and the recorder listen
+  kMap,     // FEATURES, keyframes, the map. Extractors don't listen. The main bus unless bus.map_url is set
   kTile,    // TILE_<n>: one bus for each extractor, which alone listens
 };
 
@@ -61,20 +62,20 @@ inline const Topic<ExtractorReady> kExtractorReady{"EXTRACTOR_READY", BusKind::k
 // What a restarted reassembler lacks is extracted again, which is less than all that extractors still keep.
 inline const Topic<TileFeatures> kTileFeatures{"TILE_FEATURES", BusKind::kWork, Delivery::kFromNow, Publishers::kMany};
 inline const Topic<TileAck> kTileAck{"TILE_ACK", BusKind::kMain, Delivery::kFromFirst, Publishers::kOne};
-inline const Topic<FeatureFrame> kFeatures{"FEATURES", BusKind::kMain, Delivery::kFromFirst, Publishers::kOne};
+inline const Topic<FeatureFrame> kFeatures{"FEATURES", BusKind::kMap, Delivery::kFromFirst, Publishers::kOne};
 
 inline const Topic<PoseEstimate> kPose{"POSE", BusKind::kMain, Delivery::kFromFirst, Publishers::kOne};
-inline const Topic<KeyframeObservation> kKeyframe{"KEYFRAME", BusKind::kMain, Delivery::kFromFirst, Publishers::kOne};
+inline const Topic<KeyframeObservation> kKeyframe{"KEYFRAME", BusKind::kMap, Delivery::kFromFirst, Publishers::kOne};
 
 // A late subscriber catches up by a snapshot (map/map_follower.h) instead of the whole history.
-inline const Topic<MapDelta> kMapDelta{"MAP_DELTA", BusKind::kMain, Delivery::kFromNow, Publishers::kOne};
+inline const Topic<MapDelta> kMapDelta{"MAP_DELTA", BusKind::kMap, Delivery::kFromNow, Publishers::kOne};
 inline const Topic<MapRequest> kMapRequest{"MAP_REQUEST", BusKind::kMain, Delivery::kFromNow, Publishers::kMany};
-inline const Topic<MapSnapshotPage> kMapSnapshot{"MAP_SNAPSHOT", BusKind::kMain, Delivery::kFromNow, Publishers::kOne};
+inline const Topic<MapSnapshotPage> kMapSnapshot{"MAP_SNAPSHOT", BusKind::kMap, Delivery::kFromNow, Publishers::kOne};
 inline const Topic<RemovedInDelta> kRemovedKeyframes{"REMOVED_KEYFRAMES", BusKind::kMain, Delivery::kFromFirst,
                                                      Publishers::kOne};
 
 inline const Topic<LoopResult> kLoopResult{"LOOP_RESULT", BusKind::kMain, Delivery::kFromFirst, Publishers::kOne};
-inline const Topic<GlobalAdjustment> kGlobalAdjustment{"GLOBAL_ADJUSTMENT", BusKind::kMain, Delivery::kFromFirst,
+inline const Topic<GlobalAdjustment> kGlobalAdjustment{"GLOBAL_ADJUSTMENT", BusKind::kMap, Delivery::kFromFirst,
                                                        Publishers::kOne};
 // A tracker that still waits for an answer asks again.
 inline const Topic<RelocalizationRequest> kRelocalizationRequest{"RELOCALIZATION_REQUEST", BusKind::kMain,

@@ -36,6 +36,11 @@ std::shared_ptr<Bus> OpenUdp(const std::string& url, int receive_buffer_bytes) {
                                   static_cast<size_t>(std::max(granted / 2, 1)));
 }
 
+// Replaces `mark` where it occurs.
+void Fill(std::string& url, const std::string& mark, int number) {
+  if (const size_t at = url.find(mark); at != std::string::npos) url.replace(at, mark.size(), std::to_string(number));
+}
+
 }  // namespace
 
 std::shared_ptr<Bus> OpenBus(const std::string& url, int receive_buffer_bytes) {
@@ -53,6 +58,8 @@ std::string UrlOf(const Channel& channel, const Settings& settings) {
       return bus.camera_url;
     case BusKind::kWork:
       return bus.work_url;
+    case BusKind::kMap:
+      return bus.map_url.empty() ? bus.main_url : bus.map_url;
     case BusKind::kTile:
       break;
   }
@@ -62,10 +69,8 @@ std::string UrlOf(const Channel& channel, const Settings& settings) {
     throw std::invalid_argument("extractor " + std::to_string(channel.extractor) + " has no bus: ids are 0 to " +
                                 std::to_string(kMaxExtractors - 1));
   }
-  const std::string mark = "{port}";
-  if (const size_t at = url.find(mark); at != std::string::npos) {
-    url.replace(at, mark.size(), std::to_string(port));
-  }
+  Fill(url, "{port}", port);
+  Fill(url, "{id}", channel.extractor);
   return url;
 }
 

@@ -41,7 +41,7 @@ bool IsChannelPrefix(const std::string& text);
 
 struct BusSettings {
   static constexpr const char* kSection = "bus";
-  std::string main_url, camera_url, work_url, tile_url;
+  std::string main_url, camera_url, work_url, map_url, tile_url;
   int first_tile_port = 0;
   std::string channel_prefix;
   int receive_buffer_bytes = 0;
@@ -54,6 +54,7 @@ struct BusSettings {
     field("main_url", self.main_url);
     field("camera_url", self.camera_url);
     field("work_url", self.work_url);
+    field("map_url", self.map_url);
     field("tile_url", self.tile_url);
     // Each extractor has a port of its own.
     field("first_tile_port", self.first_tile_port, Range{1, 65536 - kMaxExtractors});

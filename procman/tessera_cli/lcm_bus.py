@@ -11,7 +11,7 @@ from typing import Any
 
 import lcm
 
-from tessera_cli.constants import MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
+from tessera_cli.constants import LAN_GROUPS, MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.files import replacing
 from tessera_cli.membership import is_of_member
@@ -20,9 +20,16 @@ from tessera_cli.messages import header_t, receive
 LOG_SYNC = bytes.fromhex("eda1da01")  # the first bytes of each event in a log
 
 
-def bus_url(port: int, time_to_live: int = 0) -> str:
+def bus_url(port: int, time_to_live: int = 0, group: str = MULTICAST_GROUP) -> str:
     """`time_to_live` 0: multicast that stays on this machine."""
-    return f"udpm://{MULTICAST_GROUP}:{port}?ttl={time_to_live}"
+    return f"udpm://{group}:{port}?ttl={time_to_live}"
+
+
+def stack_bus_url(bus: str, port: int, on_lan: bool) -> str:
+    """Of a bus of PORT_OFFSETS. `port`: the base port of all. On one machine the map's bus is the main one."""
+    if not on_lan:
+        return bus_url(port + PORT_OFFSETS["main" if bus == "map" else bus])
+    return bus_url(port + PORT_OFFSETS[bus], 1, LAN_GROUPS.get(bus, MULTICAST_GROUP))
 
 
 def is_on_lan(arguments: Namespace) -> bool:

@@ -82,5 +82,19 @@ TEST(Udp, EachExtractorHasABusOfItsOwn) {
   EXPECT_THROW(UrlOf(TileTopic(-1), settings), std::invalid_argument);
 }
 
+TEST(Udp, EachExtractorMayHaveAGroupOfItsOwn) {
+  Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
+  settings.Override("bus.tile_url=udpm://239.255.77.{id}:{port}?ttl=1");
+  EXPECT_EQ(UrlOf(TileTopic(3), settings), "udpm://239.255.77.3:7683?ttl=1");
+}
+
+TEST(Udp, TheBusOfTheMapIsTheMainOneUnlessItIsSet) {
+  Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
+  EXPECT_EQ(UrlOf(kMapDelta, settings), UrlOf(kPose, settings));
+  settings.Override("bus.map_url=udpm://239.255.76.70:7671?ttl=1");
+  EXPECT_EQ(UrlOf(kMapDelta, settings), "udpm://239.255.76.70:7671?ttl=1");
+  EXPECT_NE(UrlOf(kPose, settings), UrlOf(kMapDelta, settings));
+}
+
 }  // namespace
 }  // namespace tessera

@@ -84,7 +84,8 @@ def frames(text: str) -> tuple[int, int]:
     return first, last
 
 
-def seconds(text: str) -> float:
+def second_of(text: str) -> float:
+    """A moment, counted from a beginning."""
     if not re.fullmatch(r"\d{1,9}(\.\d{1,9})?", text):
         raise argparse.ArgumentTypeError(f"must be a number of seconds, not '{text}'")
     return float(text)

@@ -26,7 +26,8 @@ from tessera_cli.experiments.plan import (
     open_folder,
 )
 from tessera_cli.experiments.progress_view import ProgressView
-from tessera_cli.experiments.runner import EVENTS, ExperimentRunner, RunOptions, disturbances
+from tessera_cli.experiments.runner import EVENTS, ExperimentRunner, RunOptions
+from tessera_cli.experiments.series import disturbances
 from tessera_cli.experiments.tables import Comparison, as_csv, as_json, print_table
 from tessera_cli.experiments.targets import STANDARD
 from tessera_cli.experiments.timeline import reconstruct

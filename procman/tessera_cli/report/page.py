@@ -10,6 +10,11 @@ from tessera_cli.files import write_text
 TEMPLATES = Path(__file__).parent / "templates"
 
 
+def page_style() -> str:
+    """The style sheet of all pages."""
+    return (TEMPLATES / "report.css").read_text()
+
+
 def write_page(path: Path, template: str, **values: Any) -> None:
     """The file is written whole or not at all."""
     environment = Environment(

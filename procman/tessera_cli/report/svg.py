@@ -94,6 +94,17 @@ def to_svg(figure: Figure, key: str, label: str) -> str:
     return re.sub(r"font: ([\d.]+px) [^;\"]*", r"font-size: \1", text)
 
 
+def standalone(svg: str, style: str) -> str:
+    """Of `to_svg`, as a file of its own, in the light colors of `style`: the content of report.css."""
+    light = style[: style.index("}")]
+    colors = dict(re.findall(r"(--[\w-]+): (#[0-9a-f]{6});", light))
+    text = re.sub(r"var\((--[\w-]+)\)", lambda match: colors[match[1]], svg)
+    opening = text.index(">") + 1
+    background = f'<rect width="100%" height="100%" fill="{colors["--card"]}" />'
+    font = "font-family: system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif"
+    return f'{text[: opening - 1]} style="{font}">{background}{text[opening:]}\n'
+
+
 def _make_ids_unique(root: ElementTree.Element, suffix: str) -> None:
     """Ids that nothing refers to are removed; the others get a suffix, since they must be unique on the whole page."""
     used: set[str] = set()

@@ -26,7 +26,7 @@ def draw_pose_times(results: list[Result]) -> Drawing | None:
     all_axes = figure.subplots(len(measures), 1, squeeze=False)[:, 0]
     words = []
     for axes, (name, axis, meaning) in zip(all_axes, measures):
-        _draw_boxes(axes, samples[name], [color_of(index) for index, _ in numbered])
+        draw_boxes(axes, samples[name], [color_of(index) for index, _ in numbered])
         names = [short(result.name) for _, result in numbered] if len(numbered) > 1 else [""]
         axes.set_yticks(range(len(names)), names)
         axes.set(xlabel=f"{axis}, {meaning}", xlim=(0, None))
@@ -46,7 +46,7 @@ def _known(result: Result, column: str) -> np.ndarray:
     return values[np.isfinite(values)]
 
 
-def _draw_boxes(axes: Axes, samples: list[np.ndarray], colors: list[str]) -> None:
+def draw_boxes(axes: Axes, samples: list[np.ndarray], colors: list[str]) -> None:
     """Horizontal, the first on top."""
     drawn = axes.boxplot(
         [sample if len(sample) else [np.nan] for sample in samples],

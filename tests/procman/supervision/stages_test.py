@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from helpers.namespaces import Lan
 from helpers.nodes import FIRST_NODE_PORT, MakeNode, Node
 from helpers.stack import ROOT, Finished, must_succeed, wait_for
+from tessera_cli.experiments.distribution.lan import Lan
 from tessera_cli.files import BIN
 
 pytestmark = pytest.mark.skipif(

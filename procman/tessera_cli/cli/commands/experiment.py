@@ -3,7 +3,15 @@
 from argparse import Namespace
 
 from tessera_cli.cli.options import add_extractors, add_frames, add_port
-from tessera_cli.cli.parsing import Commands, add_command, add_group, sensor_and_source, whole_number
+from tessera_cli.cli.parsing import (
+    Commands,
+    Parser,
+    add_command,
+    add_group,
+    sensor_and_source,
+    tiles,
+    whole_number,
+)
 from tessera_cli.files import ROOT
 
 PERFORMANCE = """\
@@ -20,6 +28,31 @@ examples:
   procman/tessera experiment performance --against f1d2cc7 --out logs/performance
   procman/tessera experiment performance --source stereo=kitti:DIR mono=sim:street-short --frames 0:200 --repetitions 3
 """
+DISTRIBUTION = """\
+The hosts are network namespaces on one switch, made and removed by the command, which needs root. Each configuration
+runs --repetitions times as fast as it goes, once with one frame at a time (latency), and the largest one with a fault
+in the middle: a host that is killed and comes back, and 2 % of the packets lost. All must give the same trajectory
+and map.
+
+The folder holds each run, the tables as {name}.json, .csv and .md, {name}.html, and its pictures. An experiment that
+was interrupted continues where it stopped when the same command is given again with its --out.
+
+Exit status: 0 measured; 1 a run failed, lost track or gave another result; 2 the arguments are wrong.
+
+examples:
+  sudo procman/tessera experiment {name}
+  sudo procman/tessera experiment {name} kitti:DIR --frames 0:300 --out logs/{name}
+  sudo procman/tessera experiment {name} stereo=sim:street --extractors 1 4 --tiles 1x1 2x2 --repetitions 1 --no-faults
+"""
+COMPARE = """\
+examples:
+  procman/tessera experiment compare logs/homogeneous logs/heterogeneous --out comparison.html
+"""
+DISTRIBUTIONS = {
+    "single": "P extractors on one machine, images cut into L x C tiles: speed, accuracy, latency and traffic.",
+    "homogeneous": "The same with the extractors on a second host as fast as the first, 1 Gbit/s.",
+    "heterogeneous": "The same with P slow nodes, four to a host, on links of 100 Mbit/s.",
+}
 SOURCES = "sources with ground truth, instead of the default"
 
 
@@ -32,6 +65,14 @@ def add_parser(commands: Commands) -> None:
         "  procman/tessera experiment extraction\n  procman/tessera experiment places sim:street,seed=9\n",
     )
     _add_performance(experiments)
+    for name, summary in DISTRIBUTIONS.items():
+        _add_distribution(experiments, name, summary)
+    compare = add_command(
+        experiments, "compare", _compare, "Two of these three experiments beside each other.", COMPARE
+    )
+    compare.add_argument("first", metavar="A", help="the folder of an experiment")
+    compare.add_argument("second", metavar="B", help="that of another one")
+    compare.add_argument("--out", metavar="FILE.html", help="the page, default comparison.html in the working folder")
     add_command(experiments, "extraction", _extraction, "Time per image, compared with cv::ORB.")
     places = add_command(experiments, "places", _places, "Recall and precision of place recognition.")
     places.add_argument("sources", metavar="SOURCE", nargs="*", help=SOURCES)
@@ -62,10 +103,7 @@ def _add_performance(experiments: Commands) -> None:
         default=[],
         help="[mono|stereo|rgbd=]SOURCE instead of the standard sequences, default mono",
     )
-    data = ROOT.parent / "shared" / "data"
-    parser.add_argument(
-        "--data", metavar="DIR", default=str(data), help=f"holds kitti/, euroc/ and rgbd/, default {data}"
-    )
+    _add_data(parser)
     add_frames(parser, ", for a quick check")
     add_extractors(parser, 1)
     parser.add_argument(
@@ -76,6 +114,61 @@ def _add_performance(experiments: Commands) -> None:
     parser.add_argument("--out", metavar="DIR", help="default logs/<date-time>-experiment-performance")
     parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
     add_port(parser)
+
+
+def _add_distribution(experiments: Commands, name: str, summary: str) -> None:
+    epilog = DISTRIBUTION.format(name=name)
+    parser = add_command(experiments, name, _distribution, summary, epilog)
+    parser.set_defaults(experiment=name)
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        nargs="?",
+        type=sensor_and_source,
+        help="[mono|stereo|rgbd=]SOURCE, default KITTI 03, else sim:street, mono",
+    )
+    count = whole_number(1, 100)
+    parser.add_argument(
+        "--repetitions", type=count, metavar="N", default=3, help="runs of each configuration, default 3"
+    )
+    parser.add_argument(
+        "--extractors", type=whole_number(1, 64), metavar="P", nargs="+", help="instead of the experiment's own"
+    )
+    parser.add_argument("--tiles", type=tiles, metavar="LxC", nargs="+", help="instead of the experiment's own cuts")
+    if name == "heterogeneous":
+        parser.add_argument(
+            "--step-ms",
+            type=whole_number(20, 10_000),
+            metavar="MS",
+            default=200,
+            help="that a slow node takes to extract a whole image, default 200",
+        )
+    parser.add_argument("--no-faults", action="store_true", help="leave out the killed node and the lost packets")
+    add_frames(parser, ", for a quick check")
+    _add_data(parser)
+    parser.add_argument("--out", metavar="DIR", help=f"default logs/<date-time>-experiment-{name}")
+    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
+    add_port(parser)
+
+
+def _add_data(parser: Parser) -> None:
+    data = ROOT.parent / "shared" / "data"
+    parser.add_argument(
+        "--data", metavar="DIR", default=str(data), help=f"holds kitti/, euroc/ and rgbd/, default {data}"
+    )
+
+
+def _distribution(arguments: Namespace) -> int:
+    from tessera_cli.experiments.distribution.experiment import measure_distribution
+    from tessera_cli.experiments.distribution.grid import EXPERIMENTS
+
+    return measure_distribution(arguments, EXPERIMENTS[arguments.experiment])
+
+
+def _compare(arguments: Namespace) -> int:
+    from tessera_cli.experiments.distribution.experiment import compare_distributions
+
+    return compare_distributions(arguments)
 
 
 def _performance(arguments: Namespace) -> int:

@@ -3,7 +3,7 @@
 from argparse import Namespace
 
 from tessera_cli.cli.options import add_lan
-from tessera_cli.cli.parsing import Commands, Main, Parser, add_command, seconds, whole_number
+from tessera_cli.cli.parsing import Commands, Main, Parser, add_command, second_of, whole_number
 
 # `tessera log TOOL LOG ...`; other words are names of processes.
 TOOLS = ("info", "gaps", "cut", "filter", "export")
@@ -30,8 +30,8 @@ def add_parser(commands: Commands) -> None:
         commands, "gaps", gaps, "Messages that a log lacks, by channel and publisher; exit status 1 if there are some."
     )
     tool = _add_tool(commands, "cut", cut, "The part of a log between two times, as a log.", "out")
-    tool.add_argument("--from", dest="first", type=seconds, metavar="S", default=0.0, help="since its first message")
-    tool.add_argument("--to", dest="last", type=seconds, metavar="S", help="default: its end")
+    tool.add_argument("--from", dest="first", type=second_of, metavar="S", default=0.0, help="since its first message")
+    tool.add_argument("--to", dest="last", type=second_of, metavar="S", help="default: its end")
     tool = _add_tool(commands, "filter", filter_channels, "Some channels of a log, as a log.", "out")
     tool.add_argument("channels", metavar="CHANNEL", nargs="+", help="patterns are possible: 'TILE_*'")
     tool.add_argument("--without", action="store_true", help="all channels but these")

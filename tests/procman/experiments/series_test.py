@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tessera_cli.experiments.plan import THIS, ExperimentFolder, PlannedRun, Sequence, alternate
-from tessera_cli.experiments.runner import CIRCUMSTANCES, disturbances
+from tessera_cli.experiments.series import CIRCUMSTANCES, disturbances
 
 RUNS = alternate([Sequence("a drive", "mono", "kitti:/a/drive")], [THIS], 3)
 
