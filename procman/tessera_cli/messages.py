@@ -10,10 +10,17 @@ from tessera_cli.files import BUILD
 sys.path.insert(0, str(BUILD / "lcmtypes" / "python"))
 
 from tessera import (
+    calibration_t,
     camera_image_t,
     end_of_stream_t,
+    features_t,
+    ground_truth_t,
     header_t,
     heartbeat_t,
+    map_delta_t,
+    map_file_t,
+    map_request_t,
+    map_snapshot_t,
     pose_t,
     procman_list_t,
     procman_order_t,
@@ -25,12 +32,19 @@ from tessera import (
 )
 
 __all__ = [
+    "calibration_t",
     "camera_image_t",
     "decode",
     "decode_as",
     "end_of_stream_t",
+    "features_t",
+    "ground_truth_t",
     "header_t",
     "heartbeat_t",
+    "map_delta_t",
+    "map_file_t",
+    "map_request_t",
+    "map_snapshot_t",
     "pose_t",
     "procman_list_t",
     "procman_order_t",

@@ -21,6 +21,7 @@ from tessera_cli.cli.commands import (
     spy,
     status,
     up,
+    view,
     vocabulary,
     watch,
 )
@@ -30,7 +31,7 @@ from tessera_cli.versions import tessera_version
 
 # In the order of --help.
 COMMANDS = (
-    *(demo, run, replay, record, evaluate, map, experiment, vocabulary, spy),
+    *(demo, run, replay, record, evaluate, map, view, experiment, vocabulary, spy),
     *(deputy, up, down, status, watch, restart, log, deploy, keys),
 )
 
