@@ -1,7 +1,7 @@
 """Decodes messages with many items fast: arrays become numpy arrays, arrays of structs structured ones.
 
-The generated decoders make one Python object for each item, which takes minutes for a map. What stands where follows from
-the same description that lcm-gen leaves in its classes: fields in order, big-endian, arrays without padding.
+The generated decoders make one Python object for each item, which takes minutes for a map. What stands where follows
+from the same description that lcm-gen leaves in its classes: fields in order, big-endian, arrays without padding.
 """
 
 import functools
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 # LCM's primitive types but string, as numpy calls them.
-_PRIMITIVES = {
+_PRIMITIVES: dict[str, np.dtype] = {
     "int8_t": np.dtype(">i1"),
     "int16_t": np.dtype(">i2"),
     "int32_t": np.dtype(">i4"),

@@ -9,6 +9,7 @@ from tessera_cli.files import BUILD
 
 sys.path.insert(0, str(BUILD / "lcmtypes" / "python"))
 
+import tessera as message_types
 from tessera import (
     calibration_t,
     camera_image_t,
@@ -45,6 +46,7 @@ __all__ = [
     "map_file_t",
     "map_request_t",
     "map_snapshot_t",
+    "message_types",
     "pose_t",
     "procman_list_t",
     "procman_order_t",

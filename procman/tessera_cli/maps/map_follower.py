@@ -1,7 +1,7 @@
 """How a listener that comes at any time follows the map of a running stack, as modules/map/map_follower.h does.
 
-The last delta that it has tells what it lacks: it asks the mapper (MAP_REQUEST) for the deltas after that, and gets these, or
-the whole map page by page. It knows no bus: messages are passed in, and what is to be asked for comes out.
+The last delta that it has tells what it lacks: it asks the mapper (MAP_REQUEST) for the deltas after that, and gets
+these, or the whole map page by page. It knows no bus: messages are passed in, and what is to be asked for comes out.
 """
 
 from collections.abc import Hashable

@@ -1,7 +1,8 @@
 """A copy of the map: what MAP_DELTA and the pages of MAP_SNAPSHOT change, applied in order.
 
-The C++ processes have the same in modules/map, with a hash that proves it equal to the mapper's. This one is for looking and
-for export: of descriptors it keeps those of landmarks, and a message that refers to what it does not know raises MapError.
+The C++ processes have the same in modules/map, with a hash that proves it equal to the mapper's. This one is for
+looking and for export: of descriptors it keeps those of landmarks, and a message that refers to what it does not know
+raises MapError.
 """
 
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The occupancy map of a run: OctoMap's binary tree (occupancy.bt), and the grid of ROS (occupancy.yaml, occupancy.pgm)."""
+"""The occupancy map of a run: the binary tree of OctoMap (occupancy.bt), and the grid of ROS (occupancy.yaml, .pgm)."""
 
 import re
 from dataclasses import dataclass
@@ -11,7 +11,8 @@ from PIL import Image
 from tessera_cli.errors import UserError
 
 TREE_DEPTH = 16
-# Two bits for each child of a node, the first child in the lowest ones: 0 unknown, 1 free, 2 occupied, 3 it has children.
+# Two bits for each child of a node, the first child in the lowest ones: 0 unknown, 1 free, 2 occupied, 3 it has
+# children.
 OCCUPIED, INNER = 2, 3
 UNKNOWN_GRAY = 205
 # Where the file does not say otherwise: x right, y forward and up against gravity, of a camera that is held upright.
@@ -65,7 +66,7 @@ def _occupied_cells(tree: bytes) -> list[tuple[int, int, int, int]]:
         at += 2
         if half == 0:
             raise IndexError("deeper than a tree can be")
-        inner = []
+        inner: list[tuple[int, int, int, int]] = []
         for child in range(8):
             state = states >> 2 * child & 3
             if state < OCCUPIED:

@@ -17,6 +17,7 @@ from tessera_cli.viewing.pictures import LeftImages, to_jpeg
 from tessera_cli.viewing.scene import (
     CAMERA,
     GRAY,
+    HERE,
     IMAGE,
     INLIERS,
     LATENCY,
@@ -29,6 +30,7 @@ from tessera_cli.viewing.scene import (
     Lines,
     Moment,
     Picture,
+    Points,
     Poses,
     Series,
     Shown,
@@ -79,8 +81,8 @@ class BusScene:
         self._path.add(message)
         rotation, position = message.world_from_camera.rotation_wxyz, message.world_from_camera.translation
         frames, seconds = np.array([moment.frame]), np.array([moment.seconds])
-        xyzw = np.roll(rotation.astype(float), -1)[None]
-        return [*shown, Poses(CAMERA, frames, seconds, position.astype(float)[None], xyzw)]
+        xyzw, here = np.roll(rotation.astype(float), -1)[None], position.astype(float)[None]
+        return [*shown, Points(HERE, here, YELLOW, 4.0, moment), Poses(CAMERA, frames, seconds, here, xyzw)]
 
     def on_truth(self, message: Any) -> list[Shown]:
         """A ground_truth_t."""
@@ -174,8 +176,8 @@ class BusScene:
             return
         self._shown_camera = (self._camera, self._grid, depth)
         yield Camera(CAMERA, self._camera, CAMERA_SIZE * depth)
-        borders = keypoints.tile_borders(*self._grid, self._camera.width, self._camera.height)
-        yield Lines(TILES, borders, YELLOW, 1.0)
+        if borders := keypoints.tile_borders(*self._grid, self._camera.width, self._camera.height):
+            yield Lines(TILES, borders, YELLOW, 1.0)
 
     def _moment_of(self, frame: int, utime_us: int) -> Moment:
         if self._start_us is None:

@@ -1,7 +1,7 @@
 """Which keypoints of an image are tracked, which are new, and which landmarks were lost.
 
-Tracked: the keypoint shows a landmark of the map. New: it shows none yet. Lost: a landmark that the image before showed, drawn
-where it should be seen in this one.
+Tracked: the keypoint shows a landmark of the map. New: it shows none yet. Lost: a landmark that the image before
+showed, drawn where it should be seen in this one.
 """
 
 from dataclasses import dataclass
@@ -57,8 +57,8 @@ def of_frame(
 ) -> Keypoints:
     """Found by projection, as the tracker does; it does not tell which landmarks it used.
 
-    `pixels` n x 2 and `descriptors` n x 32 of the frame, `pose` its world_from_camera (w x y z, translation), `candidates` numbers
-    of landmarks that may be seen, `before` those that the frame before showed.
+    `pixels` n x 2 and `descriptors` n x 32 of the frame, `pose` its world_from_camera (w x y z, translation),
+    `candidates` numbers of landmarks that may be seen, `before` those that the frame before showed.
     """
     seen_at = project(camera, *pose, replica.positions[candidates])
     is_seen = np.isfinite(seen_at[:, 0])

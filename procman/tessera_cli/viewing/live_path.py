@@ -1,10 +1,10 @@
-"""The path of the camera while the map still changes: each pose moves along with the keyframe that it is relative to."""
+"""The path of the camera while the map still changes: each pose moves along with its reference keyframe."""
 
 from typing import Any
 
 import numpy as np
 
-from tessera_cli.maps.map_replica import MapReplica
+from tessera_cli.maps.map_replica import MapReplica, Tie
 from tessera_cli.maps.poses import multiply, rotate
 
 # Removed keyframes whose parents were removed too, and so on.
@@ -61,7 +61,7 @@ class LivePath:
 
 def _place(replica: MapReplica, number: int) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Rotation, translation and scale of a keyframe in the world, also of one that was removed; None: unknown."""
-    chain = []
+    chain: list[Tie] = []
     while number not in replica.keyframes:
         if number not in replica.removed or len(chain) > MAX_CHAIN:
             return None

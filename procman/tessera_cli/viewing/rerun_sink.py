@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 
 from tessera_cli.maps.occupancy_file import UNKNOWN_GRAY
 from tessera_cli.viewing.scene import (
-    CAMERA,
+    HERE,
     IMAGE,
     WORLD,
     Camera,
@@ -125,7 +125,7 @@ def _floor(shown: Floor) -> Any:
 
 def _blueprint(look: Look) -> Any:
     if look.eye is None:
-        eye = rrb.EyeControls3D(tracking_entity=CAMERA, eye_up=(0, -1, 0))
+        eye = rrb.EyeControls3D(tracking_entity=HERE, eye_up=(0, -1, 0))
     else:
         eye = rrb.EyeControls3D(position=look.eye, look_target=look.target, eye_up=(0, -1, 0))
     world = rrb.Spatial3DView(origin=WORLD, name="map", eye_controls=eye, background=(18, 20, 24), line_grid=False)

@@ -1,7 +1,7 @@
 """What the viewer shows, as values: where something stands in the tree of entities, when, and what it looks like.
 
-The world is that of the map (its first camera: x right, y down, z forward), in meters (mono: units of the map). A value without
-a moment holds for all times and replaces the one before it.
+The world is that of the map (its first camera: x right, y down, z forward), in meters (mono: units of the map). A
+value without a moment holds for all times and replaces the one before it.
 """
 
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ KEYFRAMES, COVISIBILITY, LOOPS = f"{WORLD}/keyframes", f"{WORLD}/covisibility", 
 LANDMARKS = f"{WORLD}/landmarks"
 VOXELS, FLOOR = f"{WORLD}/occupancy/voxels", f"{WORLD}/occupancy/grid"
 CAMERA = f"{WORLD}/camera"
+HERE = f"{WORLD}/here"  # where the camera is: the eye follows it
 IMAGE = f"{CAMERA}/image"
 TILES, TRACKED, NEW, LOST = (f"{IMAGE}/{name}" for name in ("tiles", "tracked", "new", "lost"))
 LATENCY, QUEUES, INLIERS, ERROR = "latency_ms", "queue", "keypoints", "error_m"
