@@ -7,7 +7,7 @@
 
 #include "core/errors.h"
 #include "core/files.h"
-#include "evaluation/map_text.h"
+#include "evaluation/map_ply.h"
 #include "evaluation/pose_text.h"
 
 namespace tessera {
@@ -198,7 +198,7 @@ void WriteRun(const RunRecord& record, const std::string& folder) {
   WriteFile(folder + "/trajectory_live.txt", TumText(record.LiveTrajectory()));
   WriteFile(folder + "/trajectory_kitti.txt", KittiText(record.PosePerFrame()));
   WriteFile(folder + "/keyframes.txt", TumText(record.Keyframes()));
-  WriteFile(folder + "/map.ply", PlyText(record.map()));
+  WriteFile(folder + "/map.ply", PlyFile(record.map()));
   WriteFile(folder + "/ground_truth.txt", TumText(record.GroundTruth()));
   WriteFile(folder + "/frames.csv", FramesCsv(record));
   WriteFile(folder + "/loops.csv", LoopsCsv(record));

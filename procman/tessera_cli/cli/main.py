@@ -11,6 +11,7 @@ from tessera_cli.cli.commands import (
     down,
     evaluate,
     experiment,
+    export,
     keys,
     log,
     map,
@@ -31,7 +32,7 @@ from tessera_cli.versions import tessera_version
 
 # In the order of --help.
 COMMANDS = (
-    *(demo, run, replay, record, evaluate, map, view, experiment, vocabulary, spy),
+    *(demo, run, replay, record, evaluate, map, view, export, experiment, vocabulary, spy),
     *(deputy, up, down, status, watch, restart, log, deploy, keys),
 )
 

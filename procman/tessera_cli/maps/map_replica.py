@@ -96,6 +96,21 @@ class MapReplica:
         landmarks, keyframes, keypoints = (np.concatenate(columns) for columns in zip(*parts))
         return landmarks, keyframes, keypoints
 
+    def parts(self) -> list[list[int]]:
+        """Numbers of the keyframes that are connected by the spanning tree; the part with the most keyframes first."""
+        parts: dict[int, list[int]] = {}
+        root_of: dict[int, int] = {}
+        for number in sorted(self.keyframes):
+            chain = [number]
+            while chain[-1] not in root_of and self.keyframes[chain[-1]].parent in self.keyframes:
+                chain.append(self.keyframes[chain[-1]].parent)
+                if len(chain) > len(self.keyframes):
+                    raise MapError("the parents of keyframes go around in a circle")
+            root = root_of.get(chain[-1], chain[-1])
+            root_of.update(dict.fromkeys(chain, root))
+            parts.setdefault(root, []).append(number)
+        return sorted(parts.values(), key=lambda part: (-len(part), part[0]))
+
     def apply(self, change: Any) -> None:
         """A map_change_t as `decode_arrays` gives it. Parts of one change are applied one after another."""
         for added in change.new_keyframes:

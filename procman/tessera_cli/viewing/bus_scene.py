@@ -11,9 +11,9 @@ import numpy as np
 from tessera_cli.maps.map_follower import MapFollower, PartJoiner
 from tessera_cli.maps.map_replica import CameraModel
 from tessera_cli.messages import pose_t
+from tessera_cli.runs.recorded_images import LeftImages, to_jpeg
 from tessera_cli.viewing import keypoints, map_shapes
 from tessera_cli.viewing.live_path import LivePath
-from tessera_cli.viewing.pictures import LeftImages, to_jpeg
 from tessera_cli.viewing.scene import (
     CAMERA,
     GRAY,

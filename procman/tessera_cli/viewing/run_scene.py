@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from tessera_cli.maps.map_replica import MapReplica
+from tessera_cli.runs.recorded_images import left_images, to_jpeg
 from tessera_cli.runs.run_folder import SAME_TIME_S, Frames, Result
-from tessera_cli.runs.trajectories import Trajectory
+from tessera_cli.runs.trajectories import Trajectory, truth_in_estimate
 from tessera_cli.viewing import keypoints, map_shapes
-from tessera_cli.viewing.pictures import pictures_of
 from tessera_cli.viewing.scene import (
     CAMERA,
     ERROR,
     GRAY,
+    IMAGE,
     INLIERS,
     LATENCY,
     TILES,
@@ -42,7 +43,7 @@ def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:
     start_s = _start_s(result)
     yield Lines(TRAJECTORY, [result.estimate.positions], YELLOW, 2.0)
     if result.truth is not None and result.error is not None:
-        yield Lines(TRUTH, [truth_in_map(result)], GRAY, 2.0)
+        yield Lines(TRUTH, [truth_in_estimate(result.truth, result.error)[0]], GRAY, 2.0)
     yield from map_shapes.shapes_of(replica)
     if replica.keyframes:
         yield from _camera(result, replica)
@@ -53,13 +54,6 @@ def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:
         yield Series(f"{ERROR}/position", numbers, error.timestamps_s - start_s, error.errors_m)
     if result.frames is not None:
         yield from series_of(result.frames, start_s)
-
-
-def truth_in_map(result: Result) -> np.ndarray:
-    """N x 3: the inverse of the alignment by which the error was measured."""
-    assert result.truth is not None and result.error is not None
-    error = result.error
-    return (result.truth.positions - error.translation) @ error.rotation / error.scale
 
 
 def keyframe_keypoints(result: Result, replica: MapReplica) -> Iterator[Shown]:
@@ -75,7 +69,9 @@ def keyframe_keypoints(result: Result, replica: MapReplica) -> Iterator[Shown]:
 def keyframe_pictures(result: Result, replica: MapReplica, log: Path, channel_prefix: str) -> Iterator[Picture]:
     """From a recording, the images of the keyframes."""
     moments = {moment.frame: moment for moment, _ in keyframe_moments(result, replica)}
-    yield from pictures_of(log, channel_prefix, moments)
+    for frame, _utime, image in left_images(log, channel_prefix):
+        if frame in moments:
+            yield Picture(IMAGE, to_jpeg(image), moments[frame])
 
 
 def keyframe_moments(result: Result, replica: MapReplica) -> list[tuple[Moment, int]]:

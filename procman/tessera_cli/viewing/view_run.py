@@ -8,6 +8,7 @@ from tessera_cli.errors import UserError
 from tessera_cli.files import absolute
 from tessera_cli.maps.map_file import read_map_file
 from tessera_cli.maps.map_replica import MapReplica
+from tessera_cli.runs.recorded_images import recording_of
 from tessera_cli.runs.run_folder import Result, read_run
 from tessera_cli.viewing.occupancy import occupancy_of
 from tessera_cli.viewing.run_scene import keyframe_keypoints, keyframe_pictures, scene_of
@@ -47,7 +48,5 @@ def later(folder: Path, result: Result, replica: MapReplica) -> Iterator[Shown]:
     assert result.estimate is not None
     yield from occupancy_of(folder, result.estimate.positions)
     yield from keyframe_keypoints(result, replica)
-    log = folder / "run.lcmlog"
-    if log.is_file():
-        prefix = str(result.settings.get("bus", {}).get("channel_prefix") or "")
-        yield from keyframe_pictures(result, replica, log, prefix)
+    if recording := recording_of(folder, result.settings):
+        yield from keyframe_pictures(result, replica, *recording)

@@ -1,8 +1,8 @@
 """Which keypoints are tracked, new and lost; and where tiles meet."""
 
 import numpy as np
-from helpers.made_map import is_close, make_delta, two_views
 
+from helpers.made_map import is_close, make_delta, two_views
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.viewing.keypoints import of_frame, of_keyframe, project, tile_borders
 

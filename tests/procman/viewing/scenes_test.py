@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from helpers.made_map import (
     is_close,
     make_camera,
@@ -17,15 +18,15 @@ from helpers.made_map import (
     two_views,
 )
 from helpers.made_run import NUM_FRAMES, write_run
-
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.messages import message_types as tessera
+from tessera_cli.runs.recorded_images import LeftImages
 from tessera_cli.runs.run_folder import read_run
+from tessera_cli.runs.trajectories import truth_in_estimate
 from tessera_cli.viewing import map_shapes, scene
 from tessera_cli.viewing.bus_scene import BusScene
 from tessera_cli.viewing.map_shapes import covisible_pairs, height_colors
-from tessera_cli.viewing.pictures import LeftImages
-from tessera_cli.viewing.run_scene import scene_of, tiles_of, truth_in_map
+from tessera_cli.viewing.run_scene import scene_of, tiles_of
 
 
 def made_replica() -> MapReplica:
@@ -54,10 +55,12 @@ def test_a_run_shows_path_truth_map_and_curves(tmp_path: Path) -> None:
 
 def test_the_truth_lies_on_the_estimate(tmp_path: Path) -> None:
     result = read_run(write_run(tmp_path / "run"))
-    assert result.estimate is not None
+    assert result.estimate is not None and result.truth is not None and result.error is not None
+    positions, quaternions = truth_in_estimate(result.truth, result.error)
     times = (10 * result.estimate.timestamps_s).round().astype(int)
-    apart = np.linalg.norm(truth_in_map(result)[times] - result.estimate.positions, axis=1)
+    apart = np.linalg.norm(positions[times] - result.estimate.positions, axis=1)
     assert apart.max() < 0.3, "the made run has 5 cm of noise"
+    assert np.abs(quaternions[:, 3]).min() > 0.999
 
 
 def test_tiles_are_those_of_the_settings(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Images of the CAMERA channel, put together from their bands and compressed for the viewer."""
+"""Left images of the CAMERA channel, put together from their bands; and those of a recording."""
 
 import io
 from collections.abc import Iterator
@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from tessera_cli.constants import CAMERA as CHANNEL
+from tessera_cli.constants import CAMERA
 from tessera_cli.lcm_bus import log_messages
 from tessera_cli.message_arrays import decode_arrays
 from tessera_cli.messages import camera_image_t
-from tessera_cli.viewing.scene import IMAGE, Moment, Picture
+from tessera_cli.settings import Settings
 
 JPEG_QUALITY = 80
 MAX_PIXELS = 1 << 26
@@ -54,15 +54,16 @@ def to_jpeg(image: np.ndarray) -> bytes:
 def left_images(log: Path, channel_prefix: str) -> Iterator[tuple[int, int, np.ndarray]]:
     """Frame, time in us, and image of every frame of a recorded log."""
     images = LeftImages()
-    for data in log_messages(log, channel_prefix + CHANNEL):
+    for data in log_messages(log, channel_prefix + CAMERA):
         message = decode_arrays(camera_image_t, data)
         image = images.add(message) if message is not None else None
         if message is not None and image is not None:
             yield message.frame, message.utime, image
 
 
-def pictures_of(log: Path, channel_prefix: str, moments: dict[int, Moment]) -> Iterator[Picture]:
-    """Of these frames."""
-    for frame, _utime, image in left_images(log, channel_prefix):
-        if frame in moments:
-            yield Picture(IMAGE, to_jpeg(image), moments[frame])
+def recording_of(folder: Path, settings: Settings) -> tuple[Path, str] | None:
+    """The log of a run that was recorded, and the prefix of its channels; None: it was not."""
+    log = folder / "run.lcmlog"
+    if not log.is_file():
+        return None
+    return log, str(settings.get("bus", {}).get("channel_prefix") or "")
