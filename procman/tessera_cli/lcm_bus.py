@@ -55,8 +55,15 @@ class Bus:
             if message is not None:
                 handler(message)
 
+        return self._subscribe(channel, on_message)
+
+    def subscribe_all(self, handler: Callable[[str, bytes], None]) -> None:
+        """`handler` gets channel and bytes of every message but those by which LCM tests itself."""
+        self._subscribe("(?!LCM_SELF_TEST).*", handler)
+
+    def _subscribe(self, pattern: str, handler: Callable[[str, bytes], None]) -> Any:
         # None: another program holds the port exclusively, or LCM's self-test received nothing.
-        subscription = self._lcm.subscribe(channel, on_message)
+        subscription = self._lcm.subscribe(pattern, handler)
         if subscription is None:
             raise RunError(_explain(self.url, "nothing can be received"))
         subscription.set_queue_capacity(QUEUE_CAPACITY)

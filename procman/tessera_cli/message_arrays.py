@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from tessera_cli.messages import FINGERPRINT_BYTES
+
 # LCM's primitive types but string, as numpy calls them.
 _PRIMITIVES: dict[str, np.dtype] = {
     "int8_t": np.dtype(">i1"),
@@ -23,15 +25,14 @@ _PRIMITIVES: dict[str, np.dtype] = {
     "byte": np.dtype("u1"),
     "boolean": np.dtype("?"),
 }
-_FINGERPRINT_BYTES = 8
 
 
 def decode_arrays(message_type: Any, data: bytes) -> Any | None:
     """As `messages.decode`, but arrays of numbers and of structs of fixed size are read-only numpy arrays."""
-    if data[:_FINGERPRINT_BYTES] != message_type._get_packed_fingerprint():
+    if data[:FINGERPRINT_BYTES] != message_type._get_packed_fingerprint():
         return None
     try:
-        message, end = _read(message_type, data, _FINGERPRINT_BYTES)
+        message, end = _read(message_type, data, FINGERPRINT_BYTES)
     except (ValueError, struct.error, IndexError, UnicodeDecodeError):
         return None
     return message if end == len(data) else None

@@ -1,5 +1,6 @@
 """The message types that the build generates from lcmtypes/, and how their bytes are decoded."""
 
+import functools
 import importlib
 import struct
 import sys
@@ -55,7 +56,11 @@ __all__ = [
     "procman_status_t",
     "procman_wish_t",
     "stage_status_t",
+    "type_of",
 ]
+
+# Every message begins with what tells its type.
+FINGERPRINT_BYTES = 8
 
 # What generated code raises on bytes that are no such message.
 _DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
@@ -73,3 +78,14 @@ def decode_as(type_name: str, data: bytes) -> Any | None:
     """As `decode`, of the type of this name; None also if the build, of another commit, has no such type."""
     message_type = getattr(importlib.import_module("tessera"), type_name, None)
     return decode(message_type, data) if message_type else None
+
+
+def type_of(data: bytes) -> Any | None:
+    """The type of message that these bytes begin like; None: none of this version."""
+    return _types_by_fingerprint().get(data[:FINGERPRINT_BYTES])
+
+
+@functools.cache
+def _types_by_fingerprint() -> dict[bytes, Any]:
+    types: list[Any] = [value for name, value in vars(message_types).items() if name.endswith("_t")]
+    return {value._get_packed_fingerprint(): value for value in types if hasattr(value, "_get_packed_fingerprint")}

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.made_map import is_close, make_change, make_delta, make_keyframe, make_observation, two_views
-from helpers.made_run import NUM_FRAMES, write_run
 from mcap.reader import make_reader
 
+from helpers.made_map import is_close, make_change, make_delta, make_keyframe, make_observation, two_views
+from helpers.made_run import NUM_FRAMES, write_run
 from tessera_cli.export.colmap import model_of, write_model
 from tessera_cli.export.mcap_file import entries_of, write_mcap
 from tessera_cli.maps.map_replica import MapReplica
