@@ -1,15 +1,11 @@
 """tessera spy: what is on a bus, in lcm-spy's window or as text."""
 
-import os
 from argparse import Namespace
-from typing import NoReturn
 
 from tessera_cli.cli.options import add_port
 from tessera_cli.cli.parsing import Commands, add_command, whole_number
-from tessera_cli.console import say
 from tessera_cli.constants import PORT_OFFSETS
-from tessera_cli.errors import RunError, UserError
-from tessera_cli.files import BUILD, ROOT
+from tessera_cli.errors import UserError
 
 EPILOG = """\
 The text is a table of rates, sizes and gaps (messages whose numbers are missing in their stream; those that are
@@ -41,22 +37,6 @@ def main(arguments: Namespace) -> int:
         return spy_as_text(arguments)
     if arguments.channel or arguments.seconds:
         raise UserError("--channel and --seconds go with --text.")
-    return _open_window(arguments)
+    from tessera_cli.spy.window_spy import open_window
 
-
-def _open_window(arguments: Namespace) -> NoReturn:
-    """lcm-spy takes the place of this process."""
-    from tessera_cli.lcm_bus import bus_url
-
-    jar = BUILD / "tessera_types.jar"
-    if not jar.is_file():
-        hint = "the build makes it where a JDK is installed; procman/tessera setup installs one"
-        raise RunError(f"{jar} is missing: {hint}.")
-    if not os.environ.get("DISPLAY"):
-        raise RunError("lcm-spy is a window and needs a display, but DISPLAY is not set; spy --text needs none.")
-    url = bus_url(arguments.port + PORT_OFFSETS[arguments.bus])
-    class_path = os.pathsep.join(filter(None, [str(jar), os.environ.get("CLASSPATH")]))
-    os.environ.update(CLASSPATH=class_path, LCM_DEFAULT_URL=url)
-    say(f"lcm-spy on {url}")
-    spy = ROOT / ".venv" / "bin" / "lcm-spy"
-    os.execv(spy, [str(spy), f"--lcm-url={url}"])
+    return open_window(arguments)
