@@ -10,9 +10,17 @@ from typing import Any
 
 import lcm
 
-from tessera_cli.constants import MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
+from tessera_cli.constants import (
+    MAX_MESSAGES_PER_TURN,
+    MULTICAST_GROUP,
+    PORT_OFFSETS,
+    QUEUE_CAPACITY,
+    RECEIVE_BUFFER_BYTES,
+)
 from tessera_cli.errors import RunError
 from tessera_cli.messages import decode, header_t
+
+RECEIVE_BUFFER_LIMIT = Path("/proc/sys/net/core/rmem_max")
 
 
 def bus_url(port: int, time_to_live: int = 0) -> str:
@@ -33,14 +41,14 @@ def procman_url(arguments: Namespace) -> str:
 class Bus:
     """One LCM instance. `publisher` names this process in the headers of what it sends."""
 
-    def __init__(self, url: str, publisher: str) -> None:
-        """Raises RunError if the bus can't be opened."""
+    def __init__(self, url: str, publisher: str, hears_images: bool = False) -> None:
+        """`hears_images`, or maps: bursts need a large receive buffer. Raises RunError if the bus can't be opened."""
         self.url = url
         self._publisher = publisher
         self._epoch_us = int(time.time() * 1e6)
         self._sequences: dict[str, int] = {}
         try:
-            self._lcm = lcm.LCM(url)
+            self._lcm = lcm.LCM(f"{url}&recv_buf_size={_granted_buffer_bytes()}" if hears_images else url)
         except RuntimeError as error:
             raise RunError(_explain(url, str(error))) from error
 
@@ -118,6 +126,14 @@ def log_events(path: Path) -> Iterator[tuple[str, bytes]]:
 def log_messages(path: Path, channel: str) -> Iterator[bytes]:
     """The data of all events of a recorded log on one channel."""
     yield from (data for name, data in log_events(path) if name == channel)
+
+
+def _granted_buffer_bytes() -> int:
+    """LCM complains if it asks for more than the kernel grants."""
+    try:
+        return min(RECEIVE_BUFFER_BYTES, int(RECEIVE_BUFFER_LIMIT.read_text()))
+    except (OSError, ValueError):
+        return RECEIVE_BUFFER_BYTES
 
 
 def _explain(url: str, reason: str) -> str:

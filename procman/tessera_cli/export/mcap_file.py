@@ -11,7 +11,6 @@ from mcap.writer import Writer
 from tessera_cli.export import foxglove
 from tessera_cli.export.foxglove import CAMERA, MAP, MAP_FROM_WORLD_XYZW, WORLD, Json
 from tessera_cli.maps.map_replica import MapReplica
-from tessera_cli.maps.occupancy_file import read_grid
 from tessera_cli.runs.recorded_images import left_images, recording_of, to_jpeg
 from tessera_cli.runs.run_folder import Frames, Result
 from tessera_cli.runs.trajectories import truth_in_estimate
@@ -47,7 +46,7 @@ def entries_of(folder: Path, result: Result, replica: MapReplica) -> Iterator[En
     times_ns = _nanoseconds(result.estimate.timestamps_s)
     first_s = result.frames.times_s[0] if result.frames else result.estimate.timestamps_s[0]
     begin_ns = int(_nanoseconds(np.array([first_s]))[0])
-    yield from _whole_run(begin_ns, folder, result, replica)
+    yield from _whole_run(begin_ns, result, replica)
     placed = zip(times_ns.tolist(), result.estimate.positions.tolist(), result.estimate.quaternions_xyzw.tolist())
     for time_ns, position, quaternion in placed:
         pose = {**foxglove.stamp(time_ns), "pose": foxglove.pose(position, quaternion)}
@@ -60,7 +59,7 @@ def entries_of(folder: Path, result: Result, replica: MapReplica) -> Iterator[En
         yield from _images(*recording, replica)
 
 
-def _whole_run(begin_ns: int, folder: Path, result: Result, replica: MapReplica) -> Iterator[Entry]:
+def _whole_run(begin_ns: int, result: Result, replica: MapReplica) -> Iterator[Entry]:
     assert result.estimate is not None
     transform = foxglove.transform(begin_ns, MAP, WORLD, (0, 0, 0), MAP_FROM_WORLD_XYZW)
     yield "/tf", "foxglove.FrameTransform", begin_ns, transform
@@ -77,10 +76,9 @@ def _whole_run(begin_ns: int, folder: Path, result: Result, replica: MapReplica)
         yield "/keyframes", "foxglove.PosesInFrame", begin_ns, foxglove.poses(begin_ns, positions, quaternions)
     landmarks = replica.positions[replica.landmark_ids()]
     yield "/map", "foxglove.PointCloud", begin_ns, foxglove.point_cloud(begin_ns, landmarks)
-    if (folder / "occupancy.yaml").is_file():
-        grid = read_grid(folder / "occupancy.yaml")
-        height = float((estimate.positions @ grid.axes[2]).min())
-        yield "/occupancy", "foxglove.Grid", begin_ns, foxglove.grid(begin_ns, grid, height)
+    if result.grid is not None:
+        height = float((estimate.positions @ result.grid.axes[2]).min())
+        yield "/occupancy", "foxglove.Grid", begin_ns, foxglove.grid(begin_ns, result.grid, height)
 
 
 def _frames(frames: Frames) -> Iterator[Entry]:

@@ -29,7 +29,7 @@ UP, DOWN, QUIT = (b"\x1b[A", b"k"), (b"\x1b[B", b"j"), (b"q",)
 
 def spy_as_text(arguments: Namespace) -> int:
     """Until Ctrl-C, q, or --seconds have passed."""
-    bus = Bus(bus_url(arguments.port + PORT_OFFSETS[arguments.bus]), "spy")
+    bus = Bus(bus_url(arguments.port + PORT_OFFSETS[arguments.bus]), "spy", hears_images=True)
     traffic = Traffic()
     bus.subscribe_all(lambda channel, data: traffic.add(channel, data, time.monotonic()))
     end = time.monotonic() + arguments.seconds if arguments.seconds else float("inf")

@@ -5,22 +5,23 @@ from pathlib import Path
 
 import numpy as np
 
-from tessera_cli.maps.occupancy_file import Grid, read_grid, read_voxels
+from tessera_cli.maps.occupancy_file import Grid, read_voxels
+from tessera_cli.runs.run_folder import Result
 from tessera_cli.viewing.map_shapes import height_colors
 from tessera_cli.viewing.scene import FLOOR, VOXELS, Floor, Shown, Voxels
 
 
-def occupancy_of(folder: Path, path: np.ndarray) -> Iterator[Shown]:
-    """Nothing where the run had no occupancy stage. `path`: n x 3, positions of the camera."""
-    if (folder / "occupancy.yaml").is_file():
-        yield floor_of(read_grid(folder / "occupancy.yaml"), path)
+def occupancy_of(folder: Path, result: Result) -> Iterator[Shown]:
+    """Nothing where the run had no occupancy stage."""
+    if result.grid is not None and result.estimate is not None:
+        yield floor_of(result.grid, result.estimate.positions)
     if (folder / "occupancy.bt").is_file():
         voxels = read_voxels(folder / "occupancy.bt")
         yield Voxels(VOXELS, voxels.centers, voxels.sizes, height_colors(voxels.centers))
 
 
 def floor_of(grid: Grid, path: np.ndarray) -> Floor:
-    """At the lowest height of the path, since a grid has none itself."""
+    """At the lowest height of the path (n x 3), since a grid has none itself."""
     x, y, up = grid.axes
     height = float((path @ up).min())
     rows = grid.image.shape[0]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tessera_cli import messages
 from tessera_cli.console import say
-from tessera_cli.constants import CAMERA, LISTEN_S, MAP_ASK_S, POSE, STATUS
+from tessera_cli.constants import CAMERA, LISTEN_S, MAP_ASK_S, PORT_OFFSETS, POSE, STATUS
 from tessera_cli.lcm_bus import Bus, bus_url, is_on_lan, listen
 from tessera_cli.message_arrays import decode_arrays
 from tessera_cli.viewing.bus_scene import BusScene
@@ -26,10 +26,9 @@ SILENCE_TOLD_S = 3.0
 def view_bus(arguments: Namespace) -> int:
     lan = is_on_lan(arguments)
     with open_view(arguments, "live") as view:
-        main_bus = Bus(bus_url(arguments.port, int(lan)), f"viewer_{os.getpid()}")
-        buses = [main_bus]
-        if not arguments.no_images:
-            buses.append(Bus(bus_url(arguments.port + 1, int(lan)), f"viewer_{os.getpid()}"))
+        names = ["main"] if arguments.no_images else ["main", "camera"]
+        urls = [bus_url(arguments.port + PORT_OFFSETS[name], int(lan)) for name in names]
+        buses = [Bus(url, f"viewer_{os.getpid()}", hears_images=True) for url in urls]
         sink = view.start(Look((INLIERS_PLOT, LATENCY_PLOT, QUEUES_PLOT)))
         listener = _Listener(buses, arguments.prefix, sink)
         view.tell()

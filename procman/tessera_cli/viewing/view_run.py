@@ -45,8 +45,7 @@ def view_run(arguments: Namespace) -> int:
 
 def later(folder: Path, result: Result, replica: MapReplica) -> Iterator[Shown]:
     """What takes long to read, shown when the rest is there."""
-    assert result.estimate is not None
-    yield from occupancy_of(folder, result.estimate.positions)
+    yield from occupancy_of(folder, result)
     yield from keyframe_keypoints(result, replica)
     if recording := recording_of(folder, result.settings):
         yield from keyframe_pictures(result, replica, *recording)
