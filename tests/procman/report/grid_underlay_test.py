@@ -4,10 +4,10 @@ import re
 from pathlib import Path
 
 import numpy as np
-from helpers.made_run import true_position, write_run
-from helpers.page import Page
 from matplotlib.figure import Figure
 
+from helpers.made_run import true_position, write_run
+from helpers.page import Page
 from tessera_cli.report.grid_underlay import draw_grid, to_rgba
 from tessera_cli.report.html_report import write_report
 from tessera_cli.runs.run_folder import read_run
