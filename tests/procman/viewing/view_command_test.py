@@ -1,6 +1,7 @@
 """Where `tessera view` can't show anything it says why, in one sentence."""
 
 import socket
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ def test_folders_without_a_map_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_missing_package_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(window.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(RunError, match="rerun-sdk is missing"), open_view(arguments(tmp_path), "a run"):
         pass
 
