@@ -25,6 +25,7 @@ from tessera_cli.viewing.scene import (
     Voxels,
 )
 
+CLOSE_TIMEOUT_S = 10.0
 # Timelines; the viewer can follow either.
 FRAME, TIME = "frame", "time"
 # Of cells that were seen; the others are left out.
@@ -59,8 +60,11 @@ class RerunSink:
         self._recording.flush()
 
     def close(self) -> None:
-        """A file is complete only after this."""
-        self._recording.flush()
+        """A file is complete only after this. A viewer that is gone is not waited for."""
+        try:
+            self._recording.flush(timeout_sec=CLOSE_TIMEOUT_S)
+        except RuntimeError:
+            pass
         self._recording.disconnect()
 
     def _set_time(self, moment: Moment) -> None:

@@ -86,10 +86,9 @@ class ViewerProcess:
 
     def _why_it_ended(self) -> str:
         assert self._process.stderr is not None
-        lines = self._process.stderr.read().decode(errors="replace").strip().splitlines()
-        reason = next(
-            (line.strip() for line in lines if "rror" in line), lines[-1].strip() if lines else "no reason given"
-        )
+        lines = [line.strip() for line in self._process.stderr.read().decode(errors="replace").splitlines()]
+        reasons = [line for line in lines if line.startswith("Error: ")] or lines or ["no reason given"]
+        reason = reasons[-1]
         if self._is_window:
             return f"the viewer's window could not be kept open ({reason}); --web shows the view in a browser instead."
         return f"the web viewer ended ({reason})."

@@ -1,6 +1,7 @@
 """Where the view is shown: a window, a browser, a file, or a file beside one of these."""
 
 import importlib.util
+import os
 import time
 from argparse import Namespace
 from collections.abc import Iterator
@@ -30,6 +31,8 @@ class View:
         self._interrupt = Interrupt()
 
     def start(self, look: Look) -> "RerunSink":
+        # What rerun says of a viewer that was closed is no news.
+        os.environ.setdefault("RUST_LOG", "off")
         from tessera_cli.viewing.rerun_sink import RerunSink
 
         if self._process:
