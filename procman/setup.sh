@@ -122,6 +122,24 @@ make_python_env() {
   printf '%s\n' "$wanted" >"$stamp_file"
 }
 
+# add_viewer: what `tessera view` needs, into .venv, unless it is there already.
+add_viewer() {
+  local requirements="$root/procman/requirements-view.txt" stamp_file="$root/.venv/.viewer-stamp" wanted have=""
+  wanted="$(<"$root/.venv/.tessera-stamp") $(sha256sum <"$requirements")"
+  [ ! -f "$stamp_file" ] || have="$(<"$stamp_file")"
+  [ "$have" != "$wanted" ] || return 0
+  exec 9>"$root/logs/.setup.lock"
+  flock 9
+  say "Installing the viewer, the package rerun-sdk (230 MB to download, once)"
+  log_step "pip could not install the viewer: is this machine online? All other commands work without it." \
+    "$root/.venv/bin/python" -m pip install --disable-pip-version-check --no-deps --only-binary=:all: -r "$requirements"
+  # The viewer would send statistics of its use; tessera_cli/viewing/viewer_process.py names this folder of settings.
+  log_step "The viewer's usage statistics could not be turned off." \
+    env XDG_CONFIG_HOME="$root/.venv/etc" "$root/.venv/bin/rerun" analytics disable
+  printf '%s\n' "$wanted" >"$stamp_file"
+  finish_setup
+}
+
 # raise_receive_buffer ask|tell: `tell` only mentions a limit that is too small.
 raise_receive_buffer() {
   local limit_file=/proc/sys/net/core/rmem_max conf=/etc/sysctl.d/60-tessera.conf limit

@@ -7,7 +7,7 @@
 
 #include "core/errors.h"
 #include "core/files.h"
-#include "evaluation/map_text.h"
+#include "evaluation/map_ply.h"
 #include "evaluation/pose_text.h"
 #include "geometry/body_state.h"
 
@@ -221,7 +221,7 @@ std::vector<std::string> WriteRun(const RunRecord& record, const std::string& fo
   WriteFile(run_json, RunJson(record, not_written));
   const size_t num_told = not_written.size();
   for (const RunFile& file : more) try_to_write(file);
-  write_text("map.ply", [&] { return PlyText(record.map(), base_from_camera); });
+  write_text("map.ply", [&] { return PlyFile(record.map(), base_from_camera); });
   if (not_written.size() > num_told) WriteFile(run_json, RunJson(record, not_written));
   return not_written;
 }

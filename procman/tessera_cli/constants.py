@@ -60,6 +60,8 @@ MAP_SAVE_PERIOD_S = 60.0
 EXPERIMENT_POLL_S = 0.1
 RUN_PANEL_PERIOD_S = 0.25
 WATCH_PANEL_PERIOD_S = 0.5
+# The mapper may be in the middle of a bundle adjustment: asking for the map more often helps nobody.
+MAP_ASK_S = 0.3
 # Between two lines where there is no terminal.
 LINE_PERIOD_S = 5.0
 # The frame rate shown is that of the last poses only, so that it follows changes.

@@ -11,13 +11,22 @@ from typing import Any
 
 import lcm
 
-from tessera_cli.constants import LAN_GROUPS, MAX_MESSAGES_PER_TURN, MULTICAST_GROUP, PORT_OFFSETS, QUEUE_CAPACITY
+from tessera_cli.constants import (
+    LAN_GROUPS,
+    MAX_MESSAGES_PER_TURN,
+    MULTICAST_GROUP,
+    PORT_OFFSETS,
+    QUEUE_CAPACITY,
+    RECEIVE_BUFFER_BYTES,
+)
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.files import replacing
 from tessera_cli.membership import is_of_member
 from tessera_cli.messages import header_t, receive
 
 LOG_SYNC = bytes.fromhex("eda1da01")  # the first bytes of each event in a log
+
+RECEIVE_BUFFER_LIMIT = Path("/proc/sys/net/core/rmem_max")
 
 
 def bus_url(port: int, time_to_live: int = 0, group: str = MULTICAST_GROUP) -> str:
@@ -45,10 +54,10 @@ def procman_url(arguments: Namespace) -> str:
 class Bus:
     """One LCM instance. `publisher` names this process in the headers of what it sends."""
 
-    def __init__(self, url: str, publisher: str, epoch_us: int | None = None) -> None:
+    def __init__(self, url: str, publisher: str, epoch_us: int | None = None, hears_images: bool = False) -> None:
         """`epoch_us`: of this publisher's life, more than all earlier ones had; None: the time.
 
-        Raises RunError if the bus can't be opened.
+        `hears_images`, or maps: bursts need a large receive buffer. Raises RunError if the bus can't be opened.
         """
         self.url = url
         self._publisher = publisher
@@ -56,7 +65,7 @@ class Bus:
         self._sequences: dict[str, int] = {}
         self.num_strangers = 0  # messages passed over
         try:
-            self._lcm = lcm.LCM(url)
+            self._lcm = lcm.LCM(f"{url}&recv_buf_size={_granted_buffer_bytes()}" if hears_images else url)
         except RuntimeError as error:
             raise RunError(_explain(url, str(error))) from error
 
@@ -85,8 +94,15 @@ class Bus:
                 newest[header.publisher] = number
             handler(message)
 
+        return self._subscribe(channel, on_message)
+
+    def subscribe_all(self, handler: Callable[[str, bytes], None]) -> None:
+        """`handler` gets channel and bytes of every message but those by which LCM tests itself."""
+        self._subscribe("(?!LCM_SELF_TEST).*", handler)
+
+    def _subscribe(self, pattern: str, handler: Callable[[str, bytes], None]) -> Any:
         # None: another program holds the port exclusively, or LCM's self-test received nothing.
-        subscription = self._lcm.subscribe(channel, on_message)
+        subscription = self._lcm.subscribe(pattern, handler)
         if subscription is None:
             raise RunError(_explain(self.url, "nothing can be received"))
         subscription.set_queue_capacity(QUEUE_CAPACITY)
@@ -181,6 +197,14 @@ def write_log(path: Path, events: Iterable[LoggedEvent]) -> int:
 def log_messages(path: Path, channel: str) -> Iterator[bytes]:
     """The data of all events of a recorded log on one channel."""
     yield from (data for name, data in log_events(path) if name == channel)
+
+
+def _granted_buffer_bytes() -> int:
+    """LCM complains if it asks for more than the kernel grants."""
+    try:
+        return min(RECEIVE_BUFFER_BYTES, int(RECEIVE_BUFFER_LIMIT.read_text()))
+    except (OSError, ValueError):
+        return RECEIVE_BUFFER_BYTES
 
 
 def _explain(url: str, reason: str) -> str:

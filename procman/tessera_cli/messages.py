@@ -12,11 +12,19 @@ from tessera_cli.text import visible, visible_lines
 
 sys.path.insert(0, str(BUILD / "lcmtypes" / "python"))
 
+import tessera as message_types
 from tessera import (
+    calibration_t,
     camera_image_t,
     end_of_stream_t,
+    features_t,
+    ground_truth_t,
     header_t,
     heartbeat_t,
+    map_delta_t,
+    map_file_t,
+    map_request_t,
+    map_snapshot_t,
     pose_t,
     procman_list_t,
     procman_order_t,
@@ -29,11 +37,19 @@ from tessera import (
 )
 
 __all__ = [
+    "calibration_t",
     "camera_image_t",
     "decode",
     "end_of_stream_t",
+    "features_t",
+    "ground_truth_t",
     "header_t",
     "heartbeat_t",
+    "map_delta_t",
+    "map_file_t",
+    "map_request_t",
+    "map_snapshot_t",
+    "message_types",
     "pose_t",
     "procman_list_t",
     "procman_order_t",
@@ -45,9 +61,12 @@ __all__ = [
     "receive_as",
     "repair_request_t",
     "stage_status_t",
+    "type_of",
 ]
 
+# Every message begins with what tells its type.
 FINGERPRINT_BYTES, MAX_HEADER_BYTES = 8, 1000
+
 # What generated code raises on bytes that are no such message.
 _DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
 
@@ -76,8 +95,8 @@ def receive_as(type_name: str, data: bytes) -> Any | None:
 
 @cache
 def _types_by_fingerprint() -> dict[bytes, Any]:
-    types = [value for name, value in vars(importlib.import_module("tessera")).items() if name.endswith("_t")]
-    return {message_type._get_packed_fingerprint(): message_type for message_type in types}
+    types: list[Any] = [value for name, value in vars(message_types).items() if name.endswith("_t")]
+    return {value._get_packed_fingerprint(): value for value in types if hasattr(value, "_get_packed_fingerprint")}
 
 
 def type_name_of(data: bytes) -> str | None:
@@ -119,3 +138,8 @@ def _make_visible(message: Any) -> None:
                 if not hasattr(part, "__slots__"):
                     break
                 _make_visible(part)
+
+
+def type_of(data: bytes) -> Any | None:
+    """The type of message that these bytes begin like; None: none of this version."""
+    return _types_by_fingerprint().get(data[:FINGERPRINT_BYTES])

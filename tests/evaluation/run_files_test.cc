@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -201,10 +204,17 @@ TEST_F(RunFilesTest, RunJsonHoldsTheFigures) {
 
 TEST_F(RunFilesTest, TheMapIsACloudOfItsLandmarks) {
   WriteRun(SmallRun(), folder_);
-  const std::string text = Read("map.ply");
-  EXPECT_EQ(text.substr(0, 4), "ply\n");
-  EXPECT_NE(text.find("element vertex 1\n"), std::string::npos);
-  EXPECT_EQ(text.substr(text.find("end_header\n")), "end_header\n1.5 -2 30 0.0000 0.0000 -1.0000 1\n");
+  const std::string file = Read("map.ply");
+  EXPECT_EQ(file.substr(0, 39), "ply\nformat binary_little_endian 1.0\ncom");
+  EXPECT_NE(file.find("element vertex 1\n"), std::string::npos);
+  std::array<float, 6> position_and_normal{};
+  int32_t num_observations = 0;
+  const std::string row = file.substr(file.find("end_header\n") + 11);
+  ASSERT_EQ(row.size(), sizeof position_and_normal + sizeof num_observations);
+  std::memcpy(position_and_normal.data(), row.data(), sizeof position_and_normal);
+  std::memcpy(&num_observations, row.data() + sizeof position_and_normal, sizeof num_observations);
+  EXPECT_EQ(position_and_normal, (std::array<float, 6>{1.5, -2, 30, 0, 0, -1}));
+  EXPECT_EQ(num_observations, 1);
 }
 
 TEST_F(RunFilesTest, AnEmptyRunHasFilesToo) {

@@ -96,7 +96,8 @@ def test_a_run_leaves_its_files(reference_run: Finished) -> None:
     }
     assert not [name for name in files if "unfinished" in name]
     assert len((reference_run.folder / "trajectory_kitti.txt").read_text().splitlines()) == NUM_FRAMES
-    assert f"element vertex {reference_run.summary['landmarks']}\n" in (reference_run.folder / "map.ply").read_text()
+    num_landmarks = f"element vertex {reference_run.summary['landmarks']}\n"
+    assert num_landmarks.encode() in (reference_run.folder / "map.ply").read_bytes()
     assert (reference_run.folder / "trajectory.txt").read_text() != (
         reference_run.folder / "trajectory_live.txt"
     ).read_text()
@@ -201,7 +202,7 @@ def test_the_map_of_a_running_stack_is_the_mappers(
     followed = tessera.start("map", tmp_path / "whole.ply", "--follow", "--port", port)
     now = tessera.command("map", tmp_path / "now.ply", "--port", port).must_end_well()
     assert "as the mapper's" in now.out
-    assert (tmp_path / "now.ply").read_text().startswith("ply\n")
+    assert (tmp_path / "now.ply").read_bytes().startswith(b"ply\n")
     out, _ = followed.communicate(timeout=RUN_TIMEOUT_S)
     assert followed.returncode == 0, out
     run_out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
@@ -209,7 +210,7 @@ def test_the_map_of_a_running_stack_is_the_mappers(
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["map_sha256"] == reference_run.summary["map_sha256"]
     assert summary["map_sha256"] in out
-    assert (tmp_path / "whole.ply").read_text() == (folder / "map.ply").read_text()
+    assert (tmp_path / "whole.ply").read_bytes() == (folder / "map.ply").read_bytes()
 
 
 def test_map_without_a_stack_is_refused(tessera: Tessera, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from helpers.stack import ROOT
 
 PACKAGE = ROOT / "procman" / "tessera_cli"
 # Bottom to top; modules outside of packages are below them all (procman/README.md).
-LAYERS = ("cluster", "supervision", "runs", "report", "experiments", "cli")
+LAYERS = ("cluster", "supervision", "spy", "maps", "runs", "report", "export", "viewing", "experiments", "cli")
 MAX_FUNCTION_LINES = 60
 
 

@@ -7,7 +7,7 @@
 #include <random>
 #include <sstream>
 
-#include "evaluation/map_text.h"
+#include "evaluation/map_ply.h"
 #include "map/map.h"
 #include "stages/dispatcher/dispatcher_stage.h"
 #include "stages/evaluator/evaluator_stage.h"

@@ -35,6 +35,9 @@ DispatcherStage::DispatcherStage(StageContext& context)
       session_(OptionsFrom(context)),
       end_of_stream_(context.Advertise(kEndOfStream)) {
   SubscribeAll();
+  const TileGrid grid = ParseTileGrid(context.settings().Get<DispatcherSettings>().tiles);
+  context.SetValue("tile_lines", grid.lines);
+  context.SetValue("tile_columns", grid.columns);
   context.Every(std::chrono::milliseconds(200), [this] {
     session_.Watch(context_.now_us());
     GiveWork();

@@ -4,7 +4,7 @@
 
 #include "core/errors.h"
 #include "core/files.h"
-#include "evaluation/map_text.h"
+#include "evaluation/map_ply.h"
 
 namespace tessera {
 namespace {
@@ -39,7 +39,7 @@ void MapWriterStage::WriteIfDone() {
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
   if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
   try {
-    WriteFile(path_, PlyText(replica_, context_.settings().Get<BodySettings>().BaseFromCamera()));
+    WriteFile(path_, PlyFile(replica_, context_.settings().Get<BodySettings>().BaseFromCamera()));
   } catch (const InputError& error) {
     context_.Fail(error.what(), 2);
     return;

@@ -14,6 +14,7 @@ from tessera_cli.cli.commands import (
     down,
     evaluate,
     experiment,
+    export,
     keys,
     log,
     map,
@@ -24,6 +25,7 @@ from tessera_cli.cli.commands import (
     spy,
     status,
     up,
+    view,
     vocabulary,
     watch,
 )
@@ -37,7 +39,7 @@ MIN_OPEN_FILES, WANTED_OPEN_FILES = 128, 1024
 
 # In the order of --help.
 COMMANDS = (
-    *(demo, run, replay, record, evaluate, map, experiment, vocabulary, spy),
+    *(demo, run, replay, record, evaluate, map, view, export, experiment, vocabulary, spy),
     *(deputy, up, down, status, watch, restart, log, deploy, keys),
 )
 

@@ -15,6 +15,7 @@ from tessera_cli.report.drawing import (
     thin,
     width_of,
 )
+from tessera_cli.report.grid_underlay import draw_grid
 from tessera_cli.report.svg import BAD, INK, NUM_SERIES, TRUTH, new_figure, to_svg
 from tessera_cli.report.trajectory_plot import AXES, widest_axes
 from tessera_cli.runs.run_folder import Result
@@ -102,6 +103,8 @@ def _from_above(group: Group, key: str, names: str, is_hero: bool) -> Drawing:
         _draw_group(axes, group, across, along)
         axes.set(xlabel=f"{AXES[across]} [{unit}]", ylabel=f"{AXES[along]} [{unit}]")
         axes.set_aspect("equal", adjustable="datalim")
+        if len(group) == 1:
+            draw_grid(axes, group[0][1], across, along)
         add_legend(figure, columns)
         return to_svg(figure, name, label)
 
@@ -111,6 +114,8 @@ def _from_above(group: Group, key: str, names: str, is_hero: bool) -> Drawing:
         note += " The solid line is the path after all optimization, the dashed one as it was published frame by frame."
     if any(result.loops for _, result in group):
         note += " A line with circles connects a keyframe that closed a loop with the one it was matched with."
+    if len(group) == 1 and group[0][1].grid is not None:
+        note += " Under it, the occupancy grid: dark is occupied, light is free."
     title, small = f"The path from above{names}", draw(PHONE_HERO, f"{key}-small", 2)
     if not is_hero:
         return Drawing(title, label, note, small)

@@ -116,7 +116,7 @@ def _make_ids_unique(root: ElementTree.Element, suffix: str) -> None:
     for element in root.iter():
         for name, value in element.attrib.items():
             if name == f"{{{XLINK}}}href":
-                element.set(name, f"{value}-{suffix}")
+                element.set(name, f"{value}-{suffix}" if value.startswith("#") else value)
             else:
                 element.set(name, re.sub(r"url\(#([^)]+)\)", rf"url(#\1-{suffix})", value))
         if (own := element.attrib.pop("id", None)) in used:

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tessera_cli.files import replacing
+from tessera_cli.report.grid_underlay import draw_grid
 from tessera_cli.runs.run_folder import Result
 from tessera_cli.runs.trajectories import TrajectoryError
 
@@ -42,6 +43,7 @@ def _plot_error(result: Result, error: TrajectoryError, title: str, path: Path) 
     from_above.plot(error.estimate[:, across], error.estimate[:, along], color="tab:blue", linewidth=1.2, label=label)
     _draw_loops(from_above, result, across, along)
     _finish_path(from_above, error.truth, across, along, "m")
+    draw_grid(from_above, result, across, along)
     seconds = error.timestamps_s - error.timestamps_s[0]
     along_path.plot(seconds, error.errors_m, color="tab:red", linewidth=1)
     along_path.axhline(error.rms_m, color="black", linestyle="--", linewidth=1, label=f"RMS {error.rms_m:.3f} m")
@@ -62,6 +64,7 @@ def _plot_estimate(result: Result, title: str, path: Path) -> None:
     axes.plot(positions[:, across], positions[:, along], color="tab:blue", linewidth=1.2, label="estimate")
     _draw_loops(axes, result, across, along)
     _finish_path(axes, positions, across, along, result.unit)
+    draw_grid(axes, result, across, along)
     figure.suptitle(title)
     save_png(figure, path)
 

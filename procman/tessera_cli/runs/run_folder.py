@@ -16,6 +16,7 @@ import yaml
 
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT, absolute
+from tessera_cli.maps.occupancy_file import Grid, read_grid
 from tessera_cli.runs.sources import Source
 from tessera_cli.runs.trajectories import Trajectory, TrajectoryError, absolute_error, read_trajectory
 from tessera_cli.settings import Settings
@@ -50,6 +51,7 @@ SOURCE_EVENTS = (
     "the program that sends",
 )
 MAX_EVENTS = 50
+OCCUPANCY_GRID = "occupancy.yaml"
 # Trajectory files keep microseconds.
 SAME_TIME_S = 1e-4
 
@@ -121,6 +123,7 @@ class Result:
     loops: list[Loop] = field(default_factory=list)
     settings: Settings = field(default_factory=dict)
     log_warnings: list[str] = field(default_factory=list)
+    grid: Grid | None = None  # of the occupancy stage, in the estimate's world
 
     @property
     def unit(self) -> str:
@@ -170,6 +173,7 @@ def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None
         loops=read_loops(folder / "loops.csv"),
         settings=read_settings(folder / "settings.yaml"),
         log_warnings=read_log_warnings(folder / "stages"),
+        grid=read_grid(folder / OCCUPANCY_GRID) if (folder / OCCUPANCY_GRID).is_file() else None,
     )
 
 

@@ -129,6 +129,15 @@ def absolute_error(estimate: Trajectory, truth: Trajectory, with_scale: bool) ->
     )
 
 
+def truth_in_estimate(truth: Trajectory, error: TrajectoryError) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n x 3) and quaternions x y z w (n x 4) of the truth in the estimate's world."""
+    from scipy.spatial.transform import Rotation
+
+    positions = (truth.positions - error.translation) @ error.rotation / error.scale
+    turned = Rotation.from_matrix(error.rotation.T) * Rotation.from_quat(truth.quaternions_xyzw)
+    return positions, turned.as_quat()
+
+
 def length_m(positions: np.ndarray) -> float:
     """Of the path through n x 3 positions."""
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())

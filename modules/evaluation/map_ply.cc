@@ -1,0 +1,32 @@
+#include "evaluation/map_ply.h"
+
+#include <bit>
+#include <cstdint>
+
+namespace tessera {
+namespace {
+
+void Append(uint32_t bits, std::string* file) {
+  for (int shift = 0; shift < 32; shift += 8) file->push_back(static_cast<char>(bits >> shift & 0xff));
+}
+
+void Append(const Eigen::Vector3d& vector, std::string* file) {
+  for (int i = 0; i < 3; ++i) Append(std::bit_cast<uint32_t>(static_cast<float>(vector[i])), file);
+}
+
+}  // namespace
+
+std::string PlyFile(const Map& map, const Rigid3& world_from_map) {
+  std::string file = "ply\nformat binary_little_endian 1.0\ncomment landmarks of Tessera\nelement vertex " +
+                     std::to_string(map.landmarks().size()) + "\n";
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) file += std::string("property float ") + name + "\n";
+  file += "property int observations\nend_header\n";
+  map.landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
+    Append(world_from_map * landmark.position_in_world, &file);
+    Append(world_from_map.rotation * landmark.normal, &file);
+    Append(static_cast<uint32_t>(map.ObservationsOf(id).size()), &file);
+  });
+  return file;
+}
+
+}  // namespace tessera

@@ -1,0 +1,1 @@
+"""`tessera export`: runs in the formats of other programs."""

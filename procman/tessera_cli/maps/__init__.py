@@ -1,0 +1,1 @@
+"""The map in Python: a copy that follows the mapper, and files that hold it."""

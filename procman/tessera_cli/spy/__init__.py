@@ -1,0 +1,1 @@
+"""`tessera spy --text`: what is on a bus, for terminals."""

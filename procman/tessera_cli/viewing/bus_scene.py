@@ -1,0 +1,199 @@
+"""A running stack as a scene: what each message of the bus shows, and what the map shows from time to time.
+
+It knows no bus and no clock: messages are passed in, and what is to be shown comes out.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from tessera_cli.maps.map_follower import MapFollower, PartJoiner
+from tessera_cli.maps.map_replica import CameraModel
+from tessera_cli.messages import pose_t
+from tessera_cli.runs.recorded_images import LeftImages, to_jpeg
+from tessera_cli.viewing import keypoints, map_shapes
+from tessera_cli.viewing.live_path import LivePath
+from tessera_cli.viewing.scene import (
+    CAMERA,
+    GRAY,
+    HERE,
+    IMAGE,
+    INLIERS,
+    LATENCY,
+    QUEUES,
+    TILES,
+    TRAJECTORY,
+    TRUTH,
+    YELLOW,
+    Camera,
+    Lines,
+    Moment,
+    Picture,
+    Points,
+    Poses,
+    Series,
+    Shown,
+)
+
+CAMERA_SIZE = 2.0
+# Frames whose image or features wait for their pose; and keyframes whose landmarks the next frame may show.
+MAX_WAITING = 16
+NUM_NEIGHBORS = 12
+
+
+class BusScene:
+    """Call the method of each message's channel; `map_shapes` and `pictures` when there is time for them."""
+
+    def __init__(self) -> None:
+        self.follower = MapFollower()
+        self._path = LivePath()
+        self._camera: CameraModel | None = None
+        self._grid = (1, 1)
+        self._start_us: int | None = None
+        self._moment: Moment | None = None  # of the last frame
+        self._images = LeftImages()
+        self._waiting_images: dict[int, np.ndarray] = {}
+        self._waiting_features: dict[int, list[Any]] = {}  # keypoints_t, the parts of a frame
+        self._joiner = PartJoiner(MAX_WAITING)
+        self._pictured = -1  # the last frame whose image was shown
+        self._tracked = np.empty(0, int)  # landmarks in that image
+        self._map_changed = False
+        self._shown_camera: tuple[Any, ...] = ()
+
+    def on_calibration(self, message: Any) -> list[Shown]:
+        """A calibration_t."""
+        self._camera = CameraModel.of(message.camera)
+        return []
+
+    def on_pose(self, message: Any) -> list[Shown]:
+        """A pose_t."""
+        moment = self._moment_of(message.frame, message.utime)
+        curves = {
+            f"{INLIERS}/matches": message.num_matches,
+            f"{INLIERS}/inliers": message.num_inliers,
+            f"{LATENCY}/latency": 1e-3 * (message.header.utime - message.arrival),
+            f"{LATENCY}/map_wait": 1e-3 * message.map_wait_us,
+        }
+        shown: list[Shown] = [_curve(path, moment, value) for path, value in curves.items()]
+        if message.state != pose_t.TRACKED:
+            return shown
+        self._path.add(message)
+        rotation, position = message.world_from_camera.rotation_wxyz, message.world_from_camera.translation
+        frames, seconds = np.array([moment.frame]), np.array([moment.seconds])
+        xyzw, here = np.roll(rotation.astype(float), -1)[None], position.astype(float)[None]
+        return [*shown, Points(HERE, here, YELLOW, 4.0, moment), Poses(CAMERA, frames, seconds, here, xyzw)]
+
+    def on_truth(self, message: Any) -> list[Shown]:
+        """A ground_truth_t."""
+        self._path.add_truth(message)
+        return []
+
+    def on_status(self, message: Any) -> list[Shown]:
+        """A stage_status_t."""
+        if message.name == "dispatcher":
+            values = dict(zip(message.value_names, message.values))
+            self._grid = (int(values.get("tile_lines", 1)), int(values.get("tile_columns", 1)))
+        return [_curve(f"{QUEUES}/{message.name}", self._moment, message.queue)] if self._moment else []
+
+    def on_features(self, message: Any) -> list[Shown]:
+        """A features_t."""
+        if self._camera is None:
+            self._camera = CameraModel.of(message.keypoints.camera)  # the calibration was sent before we listened
+        parts = self._joiner.add(message.keypoints.frame, message)
+        if parts is not None:
+            _keep(self._waiting_features, message.keypoints.frame, [part.keypoints for part in parts])
+        return []
+
+    def on_image(self, message: Any) -> list[Shown]:
+        """A camera_image_t."""
+        image = self._images.add(message)
+        if image is not None:
+            _keep(self._waiting_images, message.frame, image)
+        return []
+
+    def on_delta(self, message: Any) -> list[Shown]:
+        """A map_delta_t."""
+        self._map_changed |= self.follower.on_delta(message)
+        return []
+
+    def on_page(self, message: Any) -> list[Shown]:
+        """A map_snapshot_t."""
+        self._map_changed |= self.follower.on_page(message)
+        return []
+
+    def map_shapes(self) -> Iterator[Shown]:
+        """The map as it is now, if it changed, and the paths in it."""
+        replica = self.follower.replica
+        if self._map_changed:
+            self._map_changed = False
+            yield from map_shapes.shapes_of(replica)
+            yield from self._camera_shape(map_shapes.frustum_depth(replica))
+        path = self._path.positions(replica)
+        yield Lines(TRAJECTORY, [path] if len(path) > 1 else [], YELLOW, 2.0)
+        truth = self._path.truth_in_map(replica, self._camera is None or self._camera.is_mono)
+        if len(truth) > 1:
+            yield Lines(TRUTH, [truth], GRAY, 2.0)
+
+    def pictures(self) -> Iterator[Shown]:
+        """The newest image that was placed and not shown yet, with its keypoints."""
+        poses = {pose.frame: pose for pose in self._path.newest(MAX_WAITING)}
+        frames = [frame for frame in self._waiting_features if frame in poses and frame > self._pictured]
+        if not frames:
+            return
+        # Without images, keypoints alone.
+        with_image = [frame for frame in frames if frame in self._waiting_images]
+        frame = max(with_image or frames)
+        self._pictured = frame
+        pose, features = poses[frame], self._waiting_features[frame]
+        moment = self._moment_of(frame, pose.utime)
+        if with_image:
+            yield Picture(IMAGE, to_jpeg(self._waiting_images[frame]), moment)
+        found = self._classify(features, pose)
+        self._tracked = found.landmarks
+        yield from keypoints.shapes_of(found, moment)
+
+    def _classify(self, features: list[Any], pose: Any) -> keypoints.Keypoints:
+        replica = self.follower.replica
+        newest = sorted(replica.keyframes)[-NUM_NEIGHBORS:]
+        near = {*newest, pose.reference_keyframe} & replica.keyframes.keys()
+        seen = [replica.keyframes[number].landmarks for number in sorted(near)]
+        candidates = np.unique(np.concatenate([np.empty(0, int), *seen]))
+        candidates = candidates[candidates >= 0]
+        placed = pose.world_from_camera
+        return keypoints.of_frame(
+            np.concatenate([np.stack([part.x, part.y], axis=1) for part in features]).astype(np.float32),
+            np.concatenate([part.descriptors["bits"] for part in features]),
+            CameraModel.of(features[0].camera),
+            (placed.rotation_wxyz.astype(float), placed.translation.astype(float)),
+            replica,
+            candidates,
+            self._tracked,
+        )
+
+    def _camera_shape(self, depth: float) -> Iterator[Shown]:
+        if self._camera is None or (self._camera, self._grid, depth) == self._shown_camera:
+            return
+        self._shown_camera = (self._camera, self._grid, depth)
+        yield Camera(CAMERA, self._camera, CAMERA_SIZE * depth)
+        if borders := keypoints.tile_borders(*self._grid, self._camera.width, self._camera.height):
+            yield Lines(TILES, borders, YELLOW, 1.0)
+
+    def _moment_of(self, frame: int, utime_us: int) -> Moment:
+        if self._start_us is None:
+            self._start_us = utime_us
+        moment = Moment(frame, 1e-6 * (utime_us - self._start_us))
+        if self._moment is None or frame > self._moment.frame:
+            self._moment = moment
+        return moment
+
+
+def _curve(path: str, moment: Moment, value: float) -> Series:
+    return Series(path, np.array([moment.frame]), np.array([moment.seconds]), np.array([float(value)]))
+
+
+def _keep(waiting: dict[int, Any], frame: int, value: Any) -> None:
+    """The newest of them only."""
+    waiting[frame] = value
+    while len(waiting) > MAX_WAITING:
+        del waiting[next(iter(waiting))]

@@ -1,0 +1,133 @@
+"""A run's folder as a scene: what stands there when the run has ended.
+
+The folder's trajectories and map are in the map's world; the truth is brought into it.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tessera_cli.maps.map_replica import MapReplica
+from tessera_cli.runs.recorded_images import left_images, to_jpeg
+from tessera_cli.runs.run_folder import SAME_TIME_S, Frames, Result
+from tessera_cli.runs.trajectories import Trajectory, truth_in_estimate
+from tessera_cli.viewing import keypoints, map_shapes
+from tessera_cli.viewing.scene import (
+    CAMERA,
+    ERROR,
+    GRAY,
+    IMAGE,
+    INLIERS,
+    LATENCY,
+    TILES,
+    TRAJECTORY,
+    TRUTH,
+    YELLOW,
+    Camera,
+    Lines,
+    Moment,
+    Picture,
+    Poses,
+    Series,
+    Shown,
+)
+
+# Of the current camera, in depths of keyframes.
+CAMERA_SIZE = 2.0
+
+
+def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:
+    """All but pictures: what is there at once."""
+    assert result.estimate is not None
+    start_s = _start_s(result)
+    yield Lines(TRAJECTORY, [result.estimate.positions], YELLOW, 2.0)
+    if result.truth is not None and result.error is not None:
+        yield Lines(TRUTH, [truth_in_estimate(result.truth, result.error)[0]], GRAY, 2.0)
+    yield from map_shapes.shapes_of(replica)
+    if replica.keyframes:
+        yield from _camera(result, replica)
+    yield _camera_poses(result.estimate, result.frames, start_s)
+    if result.error is not None:
+        error = result.error
+        numbers = _numbers_of(error.timestamps_s, result.frames)
+        yield Series(f"{ERROR}/position", numbers, error.timestamps_s - start_s, error.errors_m)
+    if result.frames is not None:
+        yield from series_of(result.frames, start_s)
+
+
+def keyframe_keypoints(result: Result, replica: MapReplica) -> Iterator[Shown]:
+    """The keypoints of each keyframe, at its frame."""
+    before = np.empty(0, int)
+    for moment, number in keyframe_moments(result, replica):
+        keyframe = replica.keyframes[number]
+        found = keypoints.of_keyframe(keyframe, replica, before)
+        before = found.landmarks
+        yield from keypoints.shapes_of(found, moment)
+
+
+def keyframe_pictures(result: Result, replica: MapReplica, log: Path, channel_prefix: str) -> Iterator[Picture]:
+    """From a recording, the images of the keyframes."""
+    moments = {moment.frame: moment for moment, _ in keyframe_moments(result, replica)}
+    for frame, _utime, image in left_images(log, channel_prefix):
+        if frame in moments:
+            yield Picture(IMAGE, to_jpeg(image), moments[frame])
+
+
+def keyframe_moments(result: Result, replica: MapReplica) -> list[tuple[Moment, int]]:
+    """When each keyframe was taken, and its number, in order of time."""
+    start_s = _start_s(result)
+    moments = [
+        (Moment(keyframe.frame, 1e-6 * keyframe.utime_us - start_s), number)
+        for number, keyframe in replica.keyframes.items()
+    ]
+    return sorted(moments, key=lambda entry: entry[0].frame)
+
+
+def series_of(frames: Frames, start_s: float) -> list[Series]:
+    """Curves of what each frame measured."""
+    columns = {
+        f"{INLIERS}/matches": frames.matches,
+        f"{INLIERS}/inliers": frames.inliers,
+        f"{LATENCY}/latency": frames.latency_ms,
+        f"{LATENCY}/pose_time": frames.pose_time_ms,
+        f"{LATENCY}/map_wait": frames.map_wait_ms,
+    }
+    series = []
+    for path, values in columns.items():
+        is_known = np.isfinite(values)
+        series.append(Series(path, frames.numbers[is_known], frames.times_s[is_known] - start_s, values[is_known]))
+    return series
+
+
+def _camera(result: Result, replica: MapReplica) -> Iterator[Shown]:
+    model = next(iter(replica.keyframes.values())).camera
+    yield Camera(CAMERA, model, CAMERA_SIZE * map_shapes.frustum_depth(replica))
+    lines, columns = tiles_of(result)
+    if lines * columns > 1:
+        yield Lines(TILES, keypoints.tile_borders(lines, columns, model.width, model.height), YELLOW, 1.0)
+
+
+def tiles_of(result: Result) -> tuple[int, int]:
+    """Lines and columns into which the run cut its images."""
+    text = str(result.settings.get("dispatcher", {}).get("tiles") or result.summary.get("tiles") or "1x1")
+    lines, _, columns = text.partition("x")
+    return (int(lines), int(columns)) if lines.isdigit() and columns.isdigit() else (1, 1)
+
+
+def _camera_poses(estimate: Trajectory, frames: Frames | None, start_s: float) -> Poses:
+    numbers = _numbers_of(estimate.timestamps_s, frames)
+    return Poses(CAMERA, numbers, estimate.timestamps_s - start_s, estimate.positions, estimate.quaternions_xyzw)
+
+
+def _numbers_of(seconds: np.ndarray, frames: Frames | None) -> np.ndarray:
+    """Of the frames that were taken at these times."""
+    if frames is None:
+        return np.arange(len(seconds))
+    following = np.searchsorted(frames.times_s, seconds - SAME_TIME_S)
+    return frames.numbers[np.clip(following, 0, len(frames.times_s) - 1)]
+
+
+def _start_s(result: Result) -> float:
+    assert result.estimate is not None
+    return float(result.frames.times_s[0] if result.frames else result.estimate.timestamps_s[0])

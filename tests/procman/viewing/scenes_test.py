@@ -1,0 +1,203 @@
+"""What a run's folder and the messages of a bus show."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from helpers.made_map import (
+    is_close,
+    make_camera,
+    make_change,
+    make_delta,
+    make_keypoints,
+    make_pose,
+    received,
+    set_header,
+    two_views,
+)
+from helpers.made_run import NUM_FRAMES, write_run
+from tessera_cli.maps.map_replica import MapReplica
+from tessera_cli.messages import message_types as tessera
+from tessera_cli.runs.recorded_images import LeftImages
+from tessera_cli.runs.run_folder import read_run
+from tessera_cli.runs.trajectories import truth_in_estimate
+from tessera_cli.viewing import map_shapes, scene
+from tessera_cli.viewing.bus_scene import BusScene
+from tessera_cli.viewing.map_shapes import covisible_pairs, height_colors
+from tessera_cli.viewing.run_scene import scene_of, tiles_of
+
+
+def made_replica() -> MapReplica:
+    replica = MapReplica()
+    replica.apply(make_delta(0, two_views()).change)
+    return replica
+
+
+def by_path(shapes: Any) -> dict[str, Any]:
+    return {shape.path: shape for shape in shapes}
+
+
+def test_a_run_shows_path_truth_map_and_curves(tmp_path: Path) -> None:
+    result = read_run(write_run(tmp_path / "run"))
+    shown = by_path(scene_of(result, made_replica()))
+    assert result.estimate is not None and result.truth is not None
+    assert is_close(shown[scene.TRAJECTORY].strips[0], result.estimate.positions)
+    assert len(shown[scene.TRUTH].strips[0]) == NUM_FRAMES
+    assert len(shown[scene.KEYFRAMES].strips) == 2
+    assert len(shown[scene.LANDMARKS].positions) == 2
+    assert shown[f"{scene.INLIERS}/inliers"].values[0] == 400
+    assert len(shown[f"{scene.LATENCY}/pose_time"].frames) == NUM_FRAMES - 1, "the first frame has none"
+    poses = shown[scene.CAMERA]
+    assert poses.frames[-1] == NUM_FRAMES - 1 and poses.seconds[-1] == pytest.approx(0.1 * (NUM_FRAMES - 1))
+
+
+def test_the_truth_lies_on_the_estimate(tmp_path: Path) -> None:
+    result = read_run(write_run(tmp_path / "run"))
+    assert result.estimate is not None and result.truth is not None and result.error is not None
+    positions, quaternions = truth_in_estimate(result.truth, result.error)
+    times = (10 * result.estimate.timestamps_s).round().astype(int)
+    apart = np.linalg.norm(positions[times] - result.estimate.positions, axis=1)
+    assert apart.max() < 0.3, "the made run has 5 cm of noise"
+    assert np.abs(quaternions[:, 3]).min() > 0.999
+
+
+def test_tiles_are_those_of_the_settings(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run")
+    (folder / "settings.yaml").write_text("dispatcher:\n  tiles: 3x4\n")
+    assert tiles_of(read_run(folder)) == (3, 4)
+    (folder / "settings.yaml").write_text("")
+    assert tiles_of(read_run(folder)) == (2, 2), "of the summary"
+
+
+def test_keyframes_are_connected_by_what_they_share() -> None:
+    replica = made_replica()
+    assert covisible_pairs(replica, min_shared=2) == [(0, 1)], "to the parent in any case"
+    replica.keyframes[1].parent = -1
+    assert covisible_pairs(replica, min_shared=2) == []
+    assert covisible_pairs(replica, min_shared=1) == [(0, 1)]
+
+
+def test_frusta_open_toward_what_the_camera_sees() -> None:
+    strip = map_shapes.frusta(made_replica(), depth=1.0)[1]
+    assert is_close(strip[0], [0.5, 0, 0])
+    assert is_close(strip[:, 2].max(), 1.0)
+    assert is_close(strip[:, 0].max(), 0.5 + 320 / 500)
+
+
+def test_higher_points_have_other_colors() -> None:
+    colors = height_colors(np.array([[0.0, -2.0, 0], [0, 1.0, 0]]))
+    assert (colors[0] > colors[1]).any()
+    assert height_colors(np.empty((0, 3))).shape == (0, 3)
+
+
+def make_pose_message(frame: int, x: float, reference: int = 0) -> Any:
+    pose = set_header(tessera.pose_t())
+    pose.frame, pose.utime, pose.state = frame, 100_000 * frame, pose.TRACKED
+    pose.world_from_camera, pose.reference_keyframe = make_pose((x, 0.0, 0.0)), reference
+    pose.reference_from_camera = make_pose((x, 0.0, 0.0))
+    pose.num_inliers, pose.header.utime, pose.arrival = 123, 50_000, 20_000
+    return received(pose)
+
+
+def make_truth(frame: int, y: float) -> Any:
+    truth = set_header(tessera.ground_truth_t())
+    truth.frame, truth.world_from_camera = frame, make_pose((0.0, y, 0.1 * (frame % 2)))
+    return received(truth)
+
+
+def test_a_pose_shows_the_camera_and_its_measures() -> None:
+    bus = BusScene()
+    bus.on_pose(make_pose_message(10, 0.0))
+    shown = by_path(bus.on_pose(make_pose_message(12, 0.2)))
+    assert shown[f"{scene.INLIERS}/inliers"].values.tolist() == [123]
+    assert shown[f"{scene.LATENCY}/latency"].values.tolist() == [30]
+    assert shown[scene.CAMERA].frames.tolist() == [12]
+    assert shown[scene.CAMERA].seconds.tolist() == [pytest.approx(0.2)]
+    assert is_close(shown[scene.HERE].positions, [[0.2, 0, 0]])
+
+
+def test_the_path_moves_along_with_keyframes_also_removed_ones() -> None:
+    bus = BusScene()
+    bus.on_delta(make_delta(0, two_views()))
+    bus.on_pose(make_pose_message(11, 0.6, reference=1))
+    moved = {"moved_keyframes": [1], "world_from_camera": [make_pose((2.0, 0.0, 0.0))], "scale": [1.0]}
+    bus.on_delta(make_delta(1, make_change(**moved)))
+    path = by_path(bus.map_shapes())[scene.TRAJECTORY]
+    assert path.strips == [], "one pose is no line"
+    bus.on_pose(make_pose_message(12, 0.7, reference=1))
+    path = by_path(bus.map_shapes())[scene.TRAJECTORY]
+    assert is_close(path.strips[0], [[2.6, 0, 0], [2.7, 0, 0]])
+    removal = make_change(
+        removed_observations=two_views().new_observations[1:], removed_landmarks=[5], removed_keyframes=[1]
+    )
+    bus.on_delta(make_delta(2, removal))
+    moved = {"moved_keyframes": [0], "world_from_camera": [make_pose((0.0, 1.0, 0.0))], "scale": [1.0]}
+    bus.on_delta(make_delta(3, make_change(**moved)))
+    path = by_path(bus.map_shapes())[scene.TRAJECTORY]
+    assert is_close(path.strips[0], [[2.6, 1, 0], [2.7, 1, 0]])
+
+
+def test_the_truth_is_brought_into_the_map() -> None:
+    bus = BusScene()
+    bus.on_delta(make_delta(0, two_views()))
+    for frame in range(20):
+        pose = set_header(tessera.pose_t())
+        pose.frame, pose.state, pose.reference_keyframe = frame, pose.TRACKED, -1
+        pose.world_from_camera = make_pose((0.2 * frame, 0.0, 0.2 * (frame % 2)))
+        bus.on_pose(received(pose))
+        bus.on_truth(make_truth(frame, 0.1 * frame))
+    shown = by_path(bus.map_shapes())
+    assert is_close(shown[scene.TRUTH].strips[0], shown[scene.TRAJECTORY].strips[0]), "twice as large, and turned"
+
+
+def test_queues_stand_at_the_frame_of_the_moment() -> None:
+    status = set_header(tessera.stage_status_t())
+    status.name, status.queue = "mapper", 4
+    bus = BusScene()
+    assert bus.on_status(received(status)) == []
+    bus.on_pose(make_pose_message(7, 0.0))
+    (curve,) = bus.on_status(received(status))
+    assert isinstance(curve, scene.Series)
+    assert (curve.path, curve.frames.tolist(), curve.values.tolist()) == (f"{scene.QUEUES}/mapper", [7], [4])
+
+
+def test_the_newest_image_is_shown_with_its_keypoints_once() -> None:
+    bus = BusScene()
+    bus.on_delta(make_delta(0, two_views()))
+    features = set_header(tessera.features_t())
+    features.keypoints = make_keypoints(12, [(320.0, 240.0), (100.0, 100.0)])
+    bus.on_features(received(features))
+    assert list(bus.pictures()) == [], "its pose is not there"
+    bus.on_pose(make_pose_message(12, 0.0))
+    shown = by_path(bus.pictures())
+    assert is_close(shown[scene.TRACKED].positions, [[320, 240]])
+    assert is_close(shown[scene.NEW].positions, [[100, 100]])
+    assert list(bus.pictures()) == []
+
+
+def make_band(frame: int, y: int, rows: int, value: int, image: int = 0) -> Any:
+    message = set_header(tessera.camera_image_t())
+    message.frame, message.width, message.height = frame, 4, 6
+    band = message.band
+    band.image, band.pixels.y, band.pixels.width, band.pixels.height = image, y, 4, rows
+    band.data, band.num_bytes = bytes([value] * 4 * rows), 4 * rows
+    return received(message)
+
+
+def test_images_are_put_together_from_bands() -> None:
+    images = LeftImages()
+    assert images.add(make_band(3, 0, 4, 10)) is None
+    assert images.add(make_band(3, 0, 6, 99, image=1)) is None, "the right image"
+    image = images.add(make_band(3, 4, 2, 20))
+    assert image is not None and image[:, 0].tolist() == [10, 10, 10, 10, 20, 20]
+    images.add(make_band(4, 0, 4, 10))
+    assert images.add(make_band(5, 4, 2, 20)) is None, "a band of another frame was lost"
+
+
+def test_bands_that_leave_the_image_are_passed_over() -> None:
+    assert LeftImages().add(make_band(3, 4, 4, 10)) is None
+    camera = set_header(tessera.calibration_t())
+    camera.camera = make_camera()
+    assert BusScene().on_calibration(received(camera)) == []
