@@ -16,9 +16,10 @@ from typing import Any
 
 import lcm
 
-from tessera_cli.constants import FIRST_TILE_PORT_OFFSET, MULTICAST_GROUP, PORT_OFFSETS
+from tessera_cli.constants import FIRST_TILE_PORT_OFFSET, LAN_TILE_GROUP, MULTICAST_GROUP
+from tessera_cli.lcm_bus import bus_url, stack_bus_url
 from tessera_cli.membership import sign_message
-from tessera_cli.messages import decode_as
+from tessera_cli.messages import receive_as
 
 tessera: Any = importlib.import_module("tessera")  # the generated types; found since messages was imported
 
@@ -63,12 +64,15 @@ OWNERS = {
     "global_adjuster": "GLOBAL_ADJUSTMENT",
     "extractor_0": "TILE_FEATURES",
 }
+MAP_CHANNELS = ("FEATURES", "KEYFRAME", "MAP_DELTA", "MAP_SNAPSHOT", "GLOBAL_ADJUSTMENT")
 
 
 def bus_of(channel: str) -> str:
-    return {"CAMERA": "camera", "TILE_FEATURES": "work"}.get(
-        channel, "tile" if channel.startswith("TILE_0") else "main"
-    )
+    if channel.startswith("TILE_0"):
+        return "tile"
+    if channel in MAP_CHANNELS:
+        return "map"
+    return {"CAMERA": "camera", "TILE_FEATURES": "work"}.get(channel, "main")
 
 
 class Attacker:
@@ -79,11 +83,11 @@ class Attacker:
         self._secret = secret
         self._publisher = ""  # under which name all is sent; empty: under that of whom it imitates
         self._sequences: Counter[str] = Counter()  # under that name, by channel
-        ports = {**PORT_OFFSETS, "tile": FIRST_TILE_PORT_OFFSET}
-        self._buses = {
-            name: lcm.LCM(f"udpm://{MULTICAST_GROUP}:{port + ports[name]}?ttl={time_to_live}")
-            for name in ("main", "camera", "work", "tile")
-        }
+        names = ("main", "camera", "work", "map") if time_to_live else ("main", "camera", "work")
+        urls = {name: stack_bus_url(name, port, bool(time_to_live)) for name in names}
+        group = LAN_TILE_GROUP.format(id=0) if time_to_live else MULTICAST_GROUP
+        urls["tile"] = bus_url(port + FIRST_TILE_PORT_OFFSET, time_to_live, group)
+        self._buses = {name: lcm.LCM(url) for name, url in urls.items()}
         self.randomness = random.Random(5)
         self.num_sent: Counter[str] = Counter()
         self.name = ""  # of the attack that is under way
@@ -93,7 +97,7 @@ class Attacker:
             bus.subscribe(".*", self._on_message).set_queue_capacity(100)
 
     def _on_message(self, channel: str, data: bytes) -> None:
-        message = decode_as(TYPES.get(channel, ""), data)
+        message = receive_as(TYPES.get(channel, ""), data)
         if message is not None and hash(data) not in self._own:
             kept = self.captured.setdefault((channel, message.header.publisher), [])
             kept[3:] = [data]
@@ -118,7 +122,7 @@ class Attacker:
         return max(epochs, default=1)
 
     def _decode(self, channel: str, data: bytes) -> Any:
-        return decode_as(TYPES[channel], data)
+        return receive_as(TYPES[channel], data)
 
     def like(self, channel: str, publisher: str) -> Any:
         """The last genuine message, to be changed and sent as the next one; one of our own if there was none."""
@@ -150,7 +154,7 @@ class Attacker:
             data = sign_message(channel, data, self._secret)
         self._own.add(hash(data))
         try:
-            self._buses[bus_of(channel)].publish(channel, data)
+            self._buses.get(bus_of(channel), self._buses["main"]).publish(channel, data)
         except (OSError, RuntimeError):
             return
         self.num_sent[self.name] += 1

@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 from helpers.attacker import ATTACKS, Attacker
-from helpers.namespaces import Lan
 from helpers.nodes import FIRST_NODE_PORT, MakeNode
 from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera, environment, pids_of, wait_for
+from tessera_cli.experiments.distribution.lan import Lan
 from tessera_cli.lcm_bus import bus_url
 from tessera_cli.membership import run_dir_of
 

@@ -18,7 +18,7 @@ def _pose(frame: int, state: int = pose_t.TRACKED, since_tracked_s: float = 0.0)
 
 
 def _report(name: str, dropped: int = 0, **values: float) -> StageReport:
-    return StageReport(name, "host", 1, 0, RUNNING, dropped, 0, 0, 0, 0, 1.0, 5.0, 60.0, "", values, 0.0)
+    return StageReport(name, "host", 1, 0, RUNNING, dropped, 0, 0, 0, 0, 0, 1.0, 5.0, 60.0, "", values, 0.0)
 
 
 def _progress(num_poses: int = 20) -> Progress:

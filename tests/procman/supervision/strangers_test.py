@@ -40,7 +40,8 @@ def make_words() -> DeputyWords:
 
 def test_a_status_counts_that_a_trusted_key_signed() -> None:
     words = make_words()
-    assert words.accept(procman_status_t, sign(make_status(), KEY)).host == "elsewhere"
+    status = words.accept(procman_status_t, sign(make_status(), KEY))
+    assert status is not None and status.host == "elsewhere"
     assert words.accept(procman_status_t, sign(make_status(sequence=1), OTHER_KEY)) is None
     unsigned = make_status(sequence=1)
     unsigned.header.tag, unsigned.key, unsigned.signature = bytes(16), KEY.verify_key.encode(), bytes(64)
