@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.image import AxesImage
 from matplotlib.transforms import Affine2D
 
 from tessera_cli.maps.occupancy_file import UNKNOWN_GRAY, Grid
@@ -27,16 +28,13 @@ def draw_grid(axes: Axes, result: Result, across: int, along: int) -> None:
     rows, columns = grid.image.shape
     # Pixel (column, row) of the image, whose rows begin with the highest y, in the plot.
     matrix = np.array([[right[0], -up[0], corner[0]], [right[1], -up[1], corner[1]], [0, 0, 1]])
-    limits = axes.get_xlim(), axes.get_ylim()
-    axes.imshow(
-        to_rgba(grid.image),
-        extent=(0, columns, rows, 0),
-        transform=Affine2D(matrix) + axes.transData,
-        interpolation="none",
-        zorder=0,
-        aspect=axes.get_aspect(),
-    )
-    axes.set(xlim=limits[0], ylim=limits[1])
+    # Not by imshow(), which would fit the axes to the image.
+    image = AxesImage(axes, extent=(0, columns, rows, 0), interpolation="none", zorder=0)
+    image.set_data(to_rgba(grid.image))
+    image.set_transform(Affine2D(matrix) + axes.transData)
+    image.set_clip_path(axes.patch)
+    image.set_in_layout(False)
+    axes.add_image(image)
 
 
 def to_rgba(image: np.ndarray) -> np.ndarray:
