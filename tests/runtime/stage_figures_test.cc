@@ -38,7 +38,8 @@ TEST(StageFigures, AStatusNamesItsProcess) {
   figures.SetValue("landmarks", 5);
   figures.SetValue("keyframes", 2);
   figures.last_error = std::string(1000, 'x');
-  const StageStatus status = figures.MakeStatus(StageState::kRunning, {.num_repaired = 3, .num_lost = 4}, 5, 6, 1, false);
+  const StageStatus status =
+      figures.MakeStatus(StageState::kRunning, {.num_repaired = 3, .num_lost = 4}, 5, 6, 1, false);
   EXPECT_EQ(status.name, "mapper");
   EXPECT_EQ(status.version, kVersion);
   EXPECT_EQ(status.num_repaired, 3);
