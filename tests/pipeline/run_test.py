@@ -334,7 +334,7 @@ def test_a_log_that_lacks_messages_is_used_as_far_as_it_goes(tessera: Tessera, l
     write_log(lossy, filter(is_kept, read_log(log)))
     finished = tessera.run(lossy, command="replay").must_end_well()
     assert f"lacks messages: {NUM_FRAMES - 3} of {NUM_FRAMES} frames are whole" in finished.out
-    assert finished.summary["frames_tracked"] >= NUM_FRAMES - 3 - 2
+    assert finished.summary["frames_tracked"] > 0.8 * NUM_FRAMES
 
 
 def publish_noise(port: int, generator: random.Random) -> None:
