@@ -124,6 +124,11 @@ def add_run_options(parser: Parser) -> None:
         help="the tracker never waits for the mapper; a recording of such a run can be replayed exactly",
     )
     _add_map_options(parser)
+    parser.add_argument(
+        "--occupancy",
+        action="store_true",
+        help="make an occupancy map of what the keyframes see: occupancy.bt (for octovis), .ot, and a 2-D grid .pgm",
+    )
     parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
     add_port(parser)
 

@@ -34,6 +34,10 @@ RUN_FILES = (
     "ground_truth.txt",
     "frames.csv",
     "loops.csv",
+    "occupancy.bt",
+    "occupancy.ot",
+    "occupancy.pgm",
+    "occupancy.yaml",
     "run.lcmlog",
     "settings.yaml",
 )

@@ -1,9 +1,14 @@
-"""What the summary of a run says where the scale of the map is in doubt."""
+"""What the summary of a run says where the scale of the map is in doubt, and of its occupancy map."""
+
+import hashlib
+from pathlib import Path
 
 import numpy as np
 
+from tessera_cli.messages import stage_status_t
 from tessera_cli.runs.run_folder import Frames
-from tessera_cli.runs.summary import scale_warnings
+from tessera_cli.runs.summary import occupancy_sha256, occupancy_warnings, scale_warnings
+from tessera_cli.supervision.progress import FINISHED, RUNNING, Progress, StageReport, to_report
 
 
 def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None = None) -> Frames:
@@ -56,3 +61,34 @@ def test_frames_that_leave_the_scale_open_are_a_stretch_with_its_factor() -> Non
 def test_doubts_of_both_kinds_come_in_the_order_of_their_frames() -> None:
     first, second = scale_warnings(_frames(400, [300], {100: 0.5}), "mono")
     assert "at frame 100 by a factor" in first and "at frame 300: the images contradicted" in second
+
+
+def test_the_occupancy_map_has_a_hash_where_there_is_one(tmp_path: Path) -> None:
+    assert occupancy_sha256(tmp_path) is None
+    (tmp_path / "occupancy.bt").write_bytes(b"tree")
+    assert occupancy_sha256(tmp_path) == hashlib.sha256(b"tree").hexdigest()
+
+
+def _report(name: str, state: int, num_without_scan: int = 0) -> StageReport:
+    status = stage_status_t()
+    status.name, status.state = name, state
+    status.value_names, status.values = ["keyframes_without_scan"], [float(num_without_scan)]
+    return to_report(status)
+
+
+def test_what_the_occupancy_map_lacks_is_told() -> None:
+    assert occupancy_warnings(None) == []
+    assert occupancy_warnings(_report("occupancy", FINISHED)) == []
+    (lacks,) = occupancy_warnings(_report("occupancy", FINISHED, 3))
+    assert "images of 3 keyframes" in lacks
+    (unfinished,) = occupancy_warnings(_report("occupancy", RUNNING))
+    assert "not finished" in unfinished
+
+
+def test_a_run_ends_when_all_that_write_its_files_have() -> None:
+    progress, is_finished = Progress(), []
+    for name, state in (("evaluator", FINISHED), ("occupancy", RUNNING), ("occupancy", FINISHED)):
+        progress.add_report(_report(name, state))
+        is_finished.append(progress.is_finished)
+    assert is_finished == [True, False, True]
+    assert not Progress().is_finished
