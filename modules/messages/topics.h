@@ -10,6 +10,7 @@
 #include "map/removed_keyframes.h"
 #include "messages/end_of_stream.h"
 #include "messages/loop_types.h"
+#include "messages/occupancy_types.h"
 #include "messages/stage_messages.h"
 #include "messages/stream_messages.h"
 #include "messages/tracking_types.h"
@@ -20,7 +21,7 @@ namespace tessera {
 // pixels and candidates have buses of their own.
 enum class BusKind {
   kMain,    // everything small. All processes listen. The stock tools' default
-  kCamera,  // CAMERA. Only the dispatcher and the recorder listen
+  kCamera,  // CAMERA. Only the dispatcher, the recorder and the occupancy stage listen
   kWork,    // TILE_FEATURES. Only the reassembler and the recorder listen
   kMap,     // FEATURES, keyframes, the map. Extractors don't listen. The main bus unless bus.map_url is set
   kTile,    // TILE_<n>: one bus for each extractor, which alone listens
@@ -82,6 +83,11 @@ inline const Topic<RelocalizationRequest> kRelocalizationRequest{"RELOCALIZATION
                                                                  Delivery::kFromNow, Publishers::kOne};
 inline const Topic<RelocalizationAnswer> kRelocalization{"RELOCALIZATION", BusKind::kMain, Delivery::kFromFirst,
                                                          Publishers::kOne};
+
+// A late subscriber asks for all blocks instead of the whole history.
+inline const Topic<OccupancyUpdate> kOccupancy{"OCCUPANCY", BusKind::kMain, Delivery::kFromNow, Publishers::kOne};
+inline const Topic<OccupancyRequest> kOccupancyRequest{"OCCUPANCY_REQUEST", BusKind::kMain, Delivery::kFromNow,
+                                                       Publishers::kMany};
 
 inline const Topic<StageStatus> kStatus{"STATUS", BusKind::kMain, Delivery::kUnordered, Publishers::kMany};
 inline const Topic<Heartbeat> kHeartbeat{"HEARTBEAT", BusKind::kMain, Delivery::kUnordered, Publishers::kMany};

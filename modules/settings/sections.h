@@ -263,8 +263,32 @@ struct RecorderSettings {
   }
 };
 
+struct OccupancySettings {
+  static constexpr const char* kSection = "occupancy";
+  double resolution_m = 0.0;
+  double max_range_m = 0.0;
+  double prob_hit = 0.0;
+  double prob_miss = 0.0;
+  double prob_min = 0.0;
+  double prob_max = 0.0;
+  double grid_below_camera_m = 0.0;
+  double grid_above_camera_m = 0.0;
+
+  template <class Self, class Field>
+  static void Visit(Self& self, Field&& field) {
+    field("resolution_m", self.resolution_m, Range{0, 100, "m"});
+    field("max_range_m", self.max_range_m, Range{0, 10'000, "m"});
+    field("prob_hit", self.prob_hit, Range{0.501, 0.999});
+    field("prob_miss", self.prob_miss, Range{0.001, 0.499});
+    field("prob_min", self.prob_min, Range{0.001, 0.499});
+    field("prob_max", self.prob_max, Range{0.501, 0.999});
+    field("grid_below_camera_m", self.grid_below_camera_m, Range{0, 1000, "m"});
+    field("grid_above_camera_m", self.grid_above_camera_m, Range{0, 1000, "m"});
+  }
+};
+
 using AllSections = std::tuple<BusSettings, StreamTimingSettings, CameraSettings, DispatcherSettings, ExtractorSettings,
                                FeaturesSettings, TrackerSettings, BodySettings, MapperSettings, LoopCloserSettings,
-                               EvaluatorSettings, MapWriterSettings, RecorderSettings>;
+                               EvaluatorSettings, MapWriterSettings, RecorderSettings, OccupancySettings>;
 
 }  // namespace tessera

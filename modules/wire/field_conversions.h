@@ -3,7 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <type_traits>
@@ -110,6 +113,17 @@ void WriteField(const Rect& rect, rect_t& field);
 Result<> ReadField(const rect_t& field, Rect& rect);  // any numbers: see IsInside
 // Whether the rectangle has pixels, all of them in an image of this size.
 bool IsInside(const Rect& rect, int width, int height);
+
+// Bytes of any content.
+template <size_t kNum>
+void WriteField(const std::array<uint8_t, kNum>& bytes, uint8_t (&field)[kNum]) {
+  std::copy(bytes.begin(), bytes.end(), field);
+}
+template <size_t kNum>
+Result<> ReadField(const uint8_t (&field)[kNum], std::array<uint8_t, kNum>& bytes) {
+  std::copy(field, field + kNum, bytes.begin());
+  return {};
+}
 
 void WriteField(const Descriptor& descriptor, descriptor_t& field);
 Result<> ReadField(const descriptor_t& field, Descriptor& descriptor);

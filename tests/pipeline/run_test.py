@@ -1,5 +1,6 @@
 """The real processes over UDP on a made sequence: every way of running gives the same trajectory, bit for bit."""
 
+import hashlib
 import json
 import os
 import random
@@ -49,6 +50,7 @@ SUMMARY_KEYS = {
     "messages_lost",
     "trajectory_sha256",
     "map_sha256",
+    "occupancy_sha256",
 }
 LOGPLAYER = ROOT / ".venv" / "bin" / "lcm-logplayer"
 
@@ -108,8 +110,15 @@ def test_evaluate_repeats_the_error_of_the_run(tessera: Tessera, reference_run: 
     assert f"{reference_run.summary['rms_error_m']:.4f} m" in finished.out
 
 
-def test_cut_and_shared_out_gives_the_same(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
-    must_equal(tessera.run(f"kitti:{sequence}", "--extractors", 3, "--tiles", "2x4"), reference_run)
+def test_cut_and_shared_out_and_listened_to_gives_the_same(
+    tessera: Tessera, sequence: Path, reference_run: Finished
+) -> None:
+    finished = tessera.run(f"kitti:{sequence}", "--extractors", 3, "--tiles", "2x4", "--occupancy")
+    must_equal(finished, reference_run)
+    assert reference_run.summary["occupancy_sha256"] is None
+    tree = (finished.folder / "occupancy.bt").read_bytes()
+    assert finished.summary["occupancy_sha256"] == hashlib.sha256(tree).hexdigest()
+    assert {"occupancy.ot", "occupancy.pgm", "occupancy.yaml"} <= {path.name for path in finished.folder.iterdir()}
 
 
 def test_a_polish_changes_the_map_at_the_end_and_nothing_before(

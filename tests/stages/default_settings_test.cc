@@ -6,6 +6,8 @@
 #include "distribution/work_queue.h"
 #include "loop_closing/loop_closer_session.h"
 #include "mapping/mapper_session.h"
+#include "occupancy/occupancy_grid.h"
+#include "occupancy/occupancy_options.h"
 #include "settings/settings.h"
 #include "tracking/map_tracker.h"
 
@@ -26,6 +28,20 @@ TEST(DefaultSettings, OfTheTracker) {
   EXPECT_EQ(settings.keyframe_min_share_with_depth, options.keyframes.min_share_with_depth);
   EXPECT_EQ(settings.keyframe_min_parallax_rad, options.keyframes.min_parallax_rad);
   EXPECT_EQ(settings.keyframe_max_interval_s, 1e-6 * static_cast<double>(options.keyframes.max_interval_us));
+}
+
+TEST(DefaultSettings, OfTheOccupancyStage) {
+  const auto settings = Defaults<OccupancySettings>();
+  const OccupancyOptions options;
+  EXPECT_EQ(settings.resolution_m, options.resolution);
+  EXPECT_EQ(settings.max_range_m, options.max_range);
+  EXPECT_EQ(settings.prob_hit, options.prob_hit);
+  EXPECT_EQ(settings.prob_miss, options.prob_miss);
+  EXPECT_EQ(settings.prob_min, options.prob_min);
+  EXPECT_EQ(settings.prob_max, options.prob_max);
+  const HeightBand band;
+  EXPECT_EQ(settings.grid_below_camera_m, band.below_camera);
+  EXPECT_EQ(settings.grid_above_camera_m, band.above_camera);
 }
 
 TEST(DefaultSettings, OfTheMapper) {

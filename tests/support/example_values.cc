@@ -413,6 +413,37 @@ bool AreSame(const RemovedInDelta& a, const RemovedInDelta& b) {
 }
 
 template <>
+OccupancyUpdate DrawValue<OccupancyUpdate>(std::mt19937& generator, int size) {
+  OccupancyUpdate update{.number = Draw(generator, 0, 999),
+                         .resolution = DrawReal(generator, 0.01, 1.0),
+                         .is_whole = Draw(generator, 0, 1) == 1,
+                         .num_keyframes = Draw(generator, 0, 99),
+                         .blocks = {}};
+  const int num_blocks = size == 0 ? 0 : 150;
+  for (int i = 0; i < num_blocks; ++i) {
+    OccupancyBlock block{.x = Draw(generator, -2048, 2047), .y = Draw(generator, -9, 9), .z = i};
+    for (size_t voxel = 0; voxel < OccupancyBlock::kNumVoxels; ++voxel) {
+      block.Set(voxel, static_cast<VoxelState>(Draw(generator, 0, 2)));
+    }
+    update.blocks.push_back(block);
+  }
+  return update;
+}
+template <>
+bool AreSame(const OccupancyUpdate& a, const OccupancyUpdate& b) {
+  return a == b;
+}
+
+template <>
+OccupancyRequest DrawValue<OccupancyRequest>(std::mt19937& generator, int) {
+  return {.num_asked = Draw(generator, 0, 99)};
+}
+template <>
+bool AreSame(const OccupancyRequest& a, const OccupancyRequest& b) {
+  return a == b;
+}
+
+template <>
 LoopResult DrawValue<LoopResult>(std::mt19937& generator, int size) {
   LoopResult result;
   result.answers = {Draw(generator, 10, 999)};

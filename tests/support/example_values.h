@@ -39,6 +39,8 @@ void ForEachSentType(Visit visit) {
   visit.template operator()<GlobalAdjustment>();
   visit.template operator()<RelocalizationRequest>();
   visit.template operator()<RelocalizationAnswer>();
+  visit.template operator()<OccupancyUpdate>();
+  visit.template operator()<OccupancyRequest>();
   visit.template operator()<PoseEstimate>();
   visit.template operator()<StageStatus>();
   visit.template operator()<Heartbeat>();

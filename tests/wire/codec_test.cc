@@ -196,6 +196,16 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<RemovedInDelta>([](RemovedInDelta& removed) { removed.delta = -1; });
 }
 
+TEST(Codec, OccupancyOutOfRangeIsRefused) {
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.number = -1; });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.resolution = 0.0; });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.num_keyframes = -1; });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.blocks.back().z = 2048; });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.blocks[0].x = -2049; });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.blocks[0].states[1023] = 0x0C; });
+  ExpectRefused<OccupancyRequest>([](OccupancyRequest& request) { request.num_asked = -1; });
+}
+
 TEST(Codec, LoopsAndAdjustmentsOutOfRangeAreRefused) {
   ExpectRefused<LoopResult>([](LoopResult& result) { result.answers.value = -1; });
   ExpectRefused<LoopResult>([](LoopResult& result) { result.matched = result.answers; });

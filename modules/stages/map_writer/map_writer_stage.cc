@@ -1,6 +1,8 @@
 #include "stages/map_writer/map_writer_stage.h"
 
+#include <chrono>
 #include <cstdio>
+#include <filesystem>
 
 #include "core/errors.h"
 #include "core/files.h"
@@ -8,6 +10,10 @@
 
 namespace tessera {
 namespace {
+
+// An occupancy stage answers between two scans.
+constexpr std::chrono::milliseconds kAskAgain{500};
+constexpr int64_t kMaxAsked = 20;
 
 std::string PathFrom(const Settings& settings) {
   auto path = settings.Get<MapWriterSettings>().path;
@@ -17,15 +23,46 @@ std::string PathFrom(const Settings& settings) {
   return path;
 }
 
+HeightBand BandFrom(const Settings& settings) {
+  const auto occupancy = settings.Get<OccupancySettings>();
+  return {.below_camera = occupancy.grid_below_camera_m, .above_camera = occupancy.grid_above_camera_m};
+}
+
 }  // namespace
 
 MapWriterStage::MapWriterStage(StageContext& context)
     : context_(context),
       path_(PathFrom(context.settings())),
+      kind_(KindOf(path_)),
       follows_(context.settings().Get<MapWriterSettings>().follow),
+      band_(BandFrom(context.settings())),
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); }, [this] { WriteIfDone(); }) {
   map_.FollowToEnd();
+  if (kind_ == Kind::kLandmarks) return;
+  if (follows_) {
+    throw InputError("map_writer.follow is for PLY files: at the end of a run, its folder holds the occupancy map");
+  }
+  requests_ = context.Advertise(kOccupancyRequest);
+  context.Subscribe(kOccupancy, [this](const OccupancyUpdate& update) {
+    if (update.is_whole) occupancy_ = update;
+    WriteIfDone();
+  });
+  context.Every(kAskAgain, [this] { AskForOccupancy(); });
+}
+
+MapWriterStage::Kind MapWriterStage::KindOf(const std::string& path) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  if (ending == ".bt") return Kind::kOccupancyTree;
+  return ending == ".pgm" ? Kind::kOccupancyGrid : Kind::kLandmarks;
+}
+
+void MapWriterStage::AskForOccupancy() {
+  if (occupancy_ || context_.finished()) return;
+  if (num_asked_ == kMaxAsked) {
+    return context_.Fail("no occupancy stage answers: the stack must run with --occupancy, and have a keyframe");
+  }
+  requests_.Publish({.num_asked = num_asked_++});
 }
 
 Result<> MapWriterStage::Apply(const MapDelta& delta) {
@@ -38,18 +75,53 @@ Result<> MapWriterStage::Apply(const MapDelta& delta) {
 void MapWriterStage::WriteIfDone() {
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
   if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
+  if (kind_ != Kind::kLandmarks && !occupancy_) return;
   try {
-    WriteFile(path_, PlyFile(replica_, context_.settings().Get<BodySettings>().BaseFromCamera()));
+    Write();
   } catch (const InputError& error) {
     context_.Fail(error.what(), 2);
     return;
   }
+  std::fflush(stdout);
+  context_.Finish();
+}
+
+void MapWriterStage::Write() const {
+  if (kind_ == Kind::kLandmarks) {
+    WriteLandmarks();
+  } else {
+    WriteOccupancy();
+  }
+}
+
+void MapWriterStage::WriteLandmarks() const {
+  WriteFile(path_, PlyFile(replica_, context_.settings().Get<BodySettings>().BaseFromCamera()));
   std::printf("map after delta %lld: %lld keyframes, %lld landmarks, hash %016llx as the mapper's, SHA-256 %s\n",
               static_cast<long long>(replica_.next_delta() - 1), static_cast<long long>(replica_.keyframes().size()),
               static_cast<long long>(replica_.landmarks().size()), static_cast<unsigned long long>(replica_.hash()),
               replica_.Sha256Hex().c_str());
-  std::fflush(stdout);
-  context_.Finish();
+}
+
+void MapWriterStage::WriteOccupancy() const {
+  OccupancyStates states(occupancy_->resolution);
+  states.Set(occupancy_->blocks);
+  if (kind_ == Kind::kOccupancyTree) {
+    WriteFile(path_, states.BinaryTreeFile());
+  } else {
+    std::vector<Rigid3> path;
+    replica_.keyframes().ForEach(
+        [&](KeyframeId, const Keyframe& keyframe) { path.push_back(keyframe.world_from_camera); });
+    const auto grid = MakeGrid(states, path, band_);
+    if (!grid) throw InputError("nothing is known of space yet: try again when there are more keyframes");
+    const std::filesystem::path image(path_);
+    WriteFile(path_, GridImageFile(*grid));
+    WriteFile(std::filesystem::path(image).replace_extension(".yaml").string(),
+              GridDescriptionFile(*grid, image.filename().string()));
+  }
+  std::printf("occupancy map of %lld keyframes: %lld voxels occupied, %lld free, of %.4g each\n",
+              static_cast<long long>(occupancy_->num_keyframes),
+              static_cast<long long>(states.Num(VoxelState::kOccupied)),
+              static_cast<long long>(states.Num(VoxelState::kFree)), states.resolution());
 }
 
 }  // namespace tessera

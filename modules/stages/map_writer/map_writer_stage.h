@@ -1,9 +1,14 @@
-// Wiring of the map writer: joins a running stack at any time, follows the map, and writes it as a cloud of points.
+// Wiring of the map writer: joins a running stack at any time, follows the map, and writes it as a cloud of points, or
+// writes its occupancy map.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "map/map.h"
+#include "messages/occupancy_types.h"
+#include "occupancy/occupancy_grid.h"
 #include "runtime/map_subscription.h"
 #include "runtime/stage.h"
 
@@ -11,18 +16,31 @@ namespace tessera {
 
 class MapWriterStage {
  public:
-  // Throws InputError if no path is given.
+  // Throws InputError if no path is given, or if it does not fit the other settings.
   explicit MapWriterStage(StageContext& context);
 
  private:
+  // What is written, by the ending of the file's name.
+  enum class Kind { kLandmarks, kOccupancyTree, kOccupancyGrid };
+  static Kind KindOf(const std::string& path);
+
+  void AskForOccupancy();
   Result<> Apply(const MapDelta& delta);
   void WriteIfDone();
+  void Write() const;
+  void WriteLandmarks() const;
+  void WriteOccupancy() const;
 
   StageContext& context_;
   const std::string path_;
+  const Kind kind_;
   const bool follows_;
+  const HeightBand band_;
   MapSubscription map_;
   Map replica_;
+  Publisher<OccupancyRequest> requests_;
+  int64_t num_asked_ = 0;
+  std::optional<OccupancyUpdate> occupancy_;  // the whole
 };
 
 }  // namespace tessera

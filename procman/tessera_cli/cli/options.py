@@ -155,6 +155,11 @@ def add_run_options(parser: Parser) -> None:
         "base_from_camera, else camera",
     )
     _add_map_options(parser)
+    parser.add_argument(
+        "--occupancy",
+        action="store_true",
+        help="make an occupancy map of what the keyframes see: occupancy.bt (for octovis), .ot, and a 2-D grid .pgm",
+    )
     parser.add_argument("--record", action="store_true", help="all channels into DIR/run.lcmlog")
     add_free_port(parser)
 

@@ -27,7 +27,7 @@ from tessera_cli.runs.ports import PortLock, take_free_port
 from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, require_no_run
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
-from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summary
+from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, occupancy_warnings, write_summary
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import read_process_list
@@ -117,6 +117,7 @@ def _counts(arguments: Namespace, source: Source) -> dict[str, int]:
     return {
         "extractor": arguments.extractors,
         "recorder": int(arguments.record),
+        "occupancy": int(arguments.occupancy),
         "camera": int(source.has_camera_process),
     }
 
@@ -206,14 +207,19 @@ class Launcher:
         self._deputy.stop()
 
     def _watch(self, view: RunView) -> str:
-        """Until the evaluator has everything. Returns how the run ended, as `RunFacts.ended` has it."""
+        """Until the files of the run are written. Returns how the run ended, as `RunFacts.ended` has it."""
         progress = self._monitor.progress
+        is_told = False
         while not progress.is_finished:
             self._look(view)
+            if progress.is_evaluated and not is_told:
+                view.say("all frames are done; the occupancy map is being completed")
+                is_told = True
             view.update(progress)
             if self._interrupt.requested:
                 return self._drain(view)
-            self._check_stall()
+            if not progress.is_evaluated:
+                self._check_stall()
         if progress.gave_up:
             return f"the source sent no image for {self._arguments.give_up:g} s and was given up (--give-up)"
         return "complete"
@@ -272,7 +278,10 @@ class Launcher:
             cpu_s={process.name: process.cpu_s for process in processes},
             max_rss_mb={process.name: process.max_rss_mb for process in processes},
             num_extractor_restarts=self._deputy.num_restarts("extractor"),
-            warnings=self._deputy.warnings + self._silence.warnings + self._missing_frames(),
+            warnings=self._deputy.warnings
+            + self._silence.warnings
+            + self._missing_frames()
+            + occupancy_warnings(self._monitor.progress.stages.get("occupancy")),
         )
         return write_summary(self._folder, run_facts, process_facts)
 

@@ -1,4 +1,4 @@
-"""The map of a running stack, which is asked of the mapper, kept up to date, and written as a PLY file."""
+"""The map of a running stack as a PLY file, or its occupancy map: asked of the stages that have them."""
 
 import os
 import tempfile

@@ -1,5 +1,6 @@
 """summary.json of a run, from what the evaluator wrote and what its processes used."""
 
+import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +15,7 @@ from tessera_cli.errors import RunError
 from tessera_cli.files import write_text
 from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run, read_source_events
 from tessera_cli.settings import without_password
+from tessera_cli.supervision.progress import FINISHED, StageReport
 from tessera_cli.text import visible_values
 from tessera_cli.versions import collect_versions
 
@@ -92,6 +94,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "tiles": facts.tiles,
         "ended": judge_end(facts.ended, evaluated),
         **{key: evaluated.get(key) for key in EVALUATOR_KEYS},
+        "occupancy_sha256": occupancy_sha256(folder),
         "rms_error_m": result.error.rms_m if result.error else None,
         "alignment": _describe_alignment(result),
         "wall_s": round(facts.wall_s, 3),
@@ -167,6 +170,24 @@ def noting_if_not_written(summary: Summary, name: str) -> Iterator[None]:
         yield
     except OSError as error:
         summary["not_written"].append(f"{name} can't be written: {error.strerror or error}")
+
+
+def occupancy_sha256(folder: Path) -> str | None:
+    """Of the occupancy map's file; None without one."""
+    path = folder / "occupancy.bt"
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+
+
+def occupancy_warnings(report: StageReport | None) -> list[str]:
+    """What the occupancy map lacks; `report`: the last one of its stage, if there was one."""
+    if report is None:
+        return []
+    if report.state != FINISHED:
+        return ["The occupancy map was not finished when the run ended: there are no occupancy files."]
+    num_missing = int(report.values.get("keyframes_without_scan", 0))
+    if num_missing == 0:
+        return []
+    return [f"The images of {num_missing} keyframes did not reach the occupancy stage: its map lacks what they saw."]
 
 
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:

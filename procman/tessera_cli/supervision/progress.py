@@ -204,6 +204,12 @@ class Progress:
         return sum(stage.dropped for stage in self.stages.values())
 
     @property
-    def is_finished(self) -> bool:
+    def is_evaluated(self) -> bool:
         """The evaluator has received the end of the stream and written its files."""
         return "evaluator" in self.stages and self.stages["evaluator"].state == FINISHED
+
+    @property
+    def is_finished(self) -> bool:
+        """The occupancy stage has written its files too, if there is one."""
+        occupancy = self.stages.get("occupancy")
+        return self.is_evaluated and (occupancy is None or occupancy.state == FINISHED)

@@ -1,13 +1,23 @@
 """What the summary of a run warns of: doubts about the scale, frames that were dropped, poses that came late."""
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tessera_cli.messages import stage_status_t
 from tessera_cli.runs.run_folder import Frames, Result, read_log_warnings, read_source_events
-from tessera_cli.runs.summary import drop_warnings, judge_end, latency_warnings, scale_warnings
+from tessera_cli.runs.summary import (
+    drop_warnings,
+    judge_end,
+    latency_warnings,
+    occupancy_sha256,
+    occupancy_warnings,
+    scale_warnings,
+)
+from tessera_cli.supervision.progress import FINISHED, RUNNING, Progress, StageReport, to_report
 
 
 def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None = None) -> Frames:
@@ -130,3 +140,34 @@ def test_every_event_of_a_live_source_is_told_in_order(tmp_path: Path) -> None:
     ]
     assert events[-1] == "20:00:13.700: images come again, after 4.7 s of silence."
     assert read_log_warnings(tmp_path) == ["camera reported 1 problem, the first: the disk is slow"]
+
+
+def test_the_occupancy_map_has_a_hash_where_there_is_one(tmp_path: Path) -> None:
+    assert occupancy_sha256(tmp_path) is None
+    (tmp_path / "occupancy.bt").write_bytes(b"tree")
+    assert occupancy_sha256(tmp_path) == hashlib.sha256(b"tree").hexdigest()
+
+
+def _report(name: str, state: int, num_without_scan: int = 0) -> StageReport:
+    status = stage_status_t()
+    status.name, status.state = name, state
+    status.value_names, status.values = ["keyframes_without_scan"], [float(num_without_scan)]
+    return to_report(status)
+
+
+def test_what_the_occupancy_map_lacks_is_told() -> None:
+    assert occupancy_warnings(None) == []
+    assert occupancy_warnings(_report("occupancy", FINISHED)) == []
+    (lacks,) = occupancy_warnings(_report("occupancy", FINISHED, 3))
+    assert "images of 3 keyframes" in lacks
+    (unfinished,) = occupancy_warnings(_report("occupancy", RUNNING))
+    assert "not finished" in unfinished
+
+
+def test_a_run_ends_when_all_that_write_its_files_have() -> None:
+    progress, is_finished = Progress(), []
+    for name, state in (("evaluator", FINISHED), ("occupancy", RUNNING), ("occupancy", FINISHED)):
+        progress.add_report(_report(name, state))
+        is_finished.append(progress.is_finished)
+    assert is_finished == [True, False, True]
+    assert not Progress().is_finished

@@ -1,0 +1,196 @@
+#include "occupancy/occupancy_session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "map/spanning_tree.h"
+
+namespace tessera {
+namespace {
+
+int64_t BytesOf(const CameraFrame& frame) {
+  return static_cast<int64_t>(frame.left.pixels.size() + frame.right.pixels.size() + 2 * frame.depth.pixels.size());
+}
+
+bool HasImages(const CameraFrame& frame, const CameraCalibration& camera) {
+  const auto fits = [&](const auto& image) {
+    return image.width == camera.width_px && image.height == camera.height_px;
+  };
+  return fits(frame.left) && (camera.sensor == SensorType::kRgbd ? fits(frame.depth) : fits(frame.right));
+}
+
+// How far the points of a scan are displaced when its camera moves, about: those at half the range.
+double Displacement(const Rigid3& from, const Rigid3& to, double range) {
+  const double angle_rad = from.rotation.angularDistance(to.rotation);
+  return (from.translation - to.translation).norm() + 0.5 * range * angle_rad;
+}
+
+}  // namespace
+
+void OccupancySession::Receive(const CameraFrame& frame) {
+  if (frame.sensor == SensorType::kMono || images_.contains(frame.id)) return;
+  const bool may_be_keyframe =
+      frame.id > last_decided_ || announced_.contains(frame.id) || keyframe_at_.contains(frame.id);
+  if (!may_be_keyframe || image_bytes_ + BytesOf(frame) > options_.max_image_bytes) return;
+  image_bytes_ += BytesOf(frame);
+  images_.emplace(frame.id, frame);
+}
+
+void OccupancySession::Receive(const PoseEstimate& pose) {
+  if (pose.is_keyframe && !keyframe_at_.contains(pose.frame)) announced_.insert(pose.frame);
+  last_decided_ = std::max(last_decided_, pose.frame);
+  for (auto it = images_.begin(); it != images_.end() && it->first <= last_decided_;) {
+    const bool is_keyframe = announced_.contains(it->first) || keyframe_at_.contains(it->first);
+    if (!is_keyframe) image_bytes_ -= BytesOf(it->second);
+    it = is_keyframe ? std::next(it) : images_.erase(it);
+  }
+}
+
+Result<> OccupancySession::Receive(const KeyframeObservation& keyframe) {
+  const FrameId frame = keyframe.features.frame;
+  announced_.erase(frame);
+  keyframe_at_[frame] = keyframe.id;
+  camera_ = keyframe.features.calibration;
+  if (!occupancy_) {
+    const OccupancyOptions fitted = FitToSensor(options_.map, *camera_);
+    TESSERA_RETURN_IF_FAILED(fitted.Check());
+    occupancy_.emplace(fitted);
+  }
+  return {};
+}
+
+void OccupancySession::Receive(const RemovedInDelta& removed) {
+  for (const KeyframeLink& link : removed.links) removed_.Add(link);
+  has_map_changed_ = true;
+}
+
+Result<> OccupancySession::Receive(const MapDelta& delta) {
+  removed_.Remember(replica_, delta);
+  has_map_changed_ = true;
+  return replica_.Apply(delta);
+}
+
+void OccupancySession::EndMap() {
+  has_map_changed_ = has_map_changed_ || !has_map_ended_;
+  has_map_ended_ = true;
+}
+
+bool OccupancySession::Advance() {
+  if (!occupancy_) return false;
+  if (MakeScan()) return true;
+  if (plan_.empty() && has_map_changed_) Plan();
+  if (plan_.empty()) return false;
+  const KeyframeId next = plan_.front();
+  plan_.pop_front();
+  Place(next);
+  return true;
+}
+
+bool OccupancySession::is_done() const {
+  const bool has_all =
+      announced_.empty() && num_without_scan() == 0 && static_cast<int64_t>(keyframe_at_.size()) >= num_expected_;
+  return has_map_ended_ && (has_all || has_given_up_) && !has_map_changed_ && plan_.empty() && !FindImage();
+}
+
+std::vector<Rigid3> OccupancySession::Path() const {
+  std::vector<Rigid3> path;
+  if (!occupancy_) return path;
+  for (const auto& [id, placed] : occupancy_->scans()) path.push_back(placed.world_from_camera);
+  return path;
+}
+
+int64_t OccupancySession::num_without_scan() const {
+  return IsMono() ? 0 : static_cast<int64_t>(keyframe_at_.size() - scans_.size());
+}
+
+// The first frame whose images are there and that is a keyframe.
+std::optional<FrameId> OccupancySession::FindImage() const {
+  for (const auto& [id, frame] : images_) {
+    if (keyframe_at_.contains(id)) return id;
+  }
+  return std::nullopt;
+}
+
+// False if there is nothing to make one from.
+bool OccupancySession::MakeScan() {
+  const std::optional<FrameId> id = FindImage();
+  if (!id) return false;
+  const auto image = images_.extract(*id);
+  const CameraFrame& frame = image.mapped();
+  image_bytes_ -= BytesOf(frame);
+  if (!HasImages(frame, *camera_)) return true;
+  scans_[keyframe_at_.at(*id)] =
+      std::make_shared<const Scan>(ScanFromImages(frame, *camera_, occupancy_->options(), options_.max_disparity_px));
+  has_map_changed_ = true;
+  return true;
+}
+
+// New scans come first, since they show most. At the end, where most have moved a little, all are cast anew, which is
+// half of the work; the result is the same.
+void OccupancySession::Plan() {
+  has_map_changed_ = false;
+  targets_.clear();
+  const std::set<KeyframeId> main_part = MainPart();
+  std::vector<KeyframeId> gone, added, moved;
+  for (const auto& [frame, id] : keyframe_at_) {
+    const OccupancyMap::Placed* placed = occupancy_->Find(id);
+    const std::optional<Rigid3> target = TargetOf(id, main_part);
+    if (target) targets_.emplace(id, *target);
+    if (!target && placed != nullptr) gone.push_back(id);
+    if (target && placed == nullptr) added.push_back(id);
+    if (target && placed != nullptr && !IsInPlace(*placed, *target, id)) moved.push_back(id);
+  }
+  plan_.assign(gone.begin(), gone.end());
+  if (has_map_ended_ && 2 * moved.size() > occupancy_->scans().size()) {
+    occupancy_->Clear();
+    for (const auto& [id, target] : targets_) plan_.push_back(id);
+    return;
+  }
+  plan_.insert(plan_.end(), added.begin(), added.end());
+  plan_.insert(plan_.end(), moved.begin(), moved.end());
+}
+
+void OccupancySession::Place(KeyframeId id) {
+  const auto target = targets_.find(id);
+  if (target == targets_.end()) {
+    occupancy_->Remove(id);
+  } else {
+    occupancy_->Put(id, ScanOf(id), target->second);
+  }
+}
+
+std::set<KeyframeId> OccupancySession::MainPart() const {
+  std::vector<KeyframeId> largest;
+  for (const KeyframeId root : Roots(replica_)) {
+    std::vector<KeyframeId> part = MapPartOf(replica_, root);
+    if (part.size() > largest.size()) largest = std::move(part);
+  }
+  return {largest.begin(), largest.end()};
+}
+
+// Where the keyframe's scan belongs; nullopt if it does not belong into the map.
+std::optional<Rigid3> OccupancySession::TargetOf(KeyframeId id, const std::set<KeyframeId>& main_part) const {
+  if (IsMono() ? replica_.FindKeyframe(id) == nullptr : !scans_.contains(id)) return std::nullopt;
+  if (!main_part.contains(removed_.Successor(replica_, id))) return std::nullopt;
+  const std::optional<Sim3> world_from_keyframe = removed_.Find(replica_, id);
+  return world_from_keyframe ? std::optional(world_from_keyframe->Pose()) : std::nullopt;
+}
+
+OccupancyMap::SharedScan OccupancySession::ScanOf(KeyframeId id) const {
+  if (!IsMono()) return scans_.at(id);
+  const Keyframe* keyframe = replica_.FindKeyframe(id);
+  return std::make_shared<const Scan>(keyframe == nullptr ? Scan{} : ScanFromLandmarks(replica_, *keyframe));
+}
+
+bool OccupancySession::IsInPlace(const OccupancyMap::Placed& placed, const Rigid3& target, KeyframeId id) const {
+  const Rigid3& now = placed.world_from_camera;
+  if (has_map_ended_) {
+    return now.rotation.coeffs() == target.rotation.coeffs() && now.translation == target.translation &&
+           (!IsMono() || *placed.scan == *ScanOf(id));
+  }
+  const OccupancyOptions& options = occupancy_->options();
+  return Displacement(now, target, options.max_range) <= options.resolution;
+}
+
+}  // namespace tessera

@@ -1,0 +1,110 @@
+#include "occupancy/scan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+
+namespace tessera {
+namespace {
+
+constexpr double kMaxCount = std::numeric_limits<uint16_t>::max();
+constexpr uint8_t kUnknownIntensity = 255;  // OctoMap's color of a voxel without one
+
+// The number of pixels from one ray to the next.
+int StrideFor(const CameraCalibration& camera, const OccupancyOptions& options) {
+  const double focal_px = std::min(camera.fx_px, camera.fy_px);
+  return std::max(1, static_cast<int>(std::floor(options.resolution * focal_px / options.max_range)));
+}
+
+template <class Pixel>
+Image<Pixel> Sample(const Image<Pixel>& image, int stride) {
+  Image<Pixel> samples((image.width + stride - 1) / stride, (image.height + stride - 1) / stride);
+  for (int y = 0; y < samples.height; ++y) {
+    const Pixel* from = image.row(y * stride);
+    Pixel* to = samples.row(y);
+    for (int x = 0; x < samples.width; ++x) to[x] = from[x * stride];
+  }
+  return samples;
+}
+
+cv::Mat View(const GrayImage& image) {
+  return {image.height, image.width, CV_8UC1, const_cast<uint8_t*>(image.pixels.data())};
+}
+
+// Disparities in 1/16 px; not positive: none.
+cv::Mat MatchDisparities(const CameraFrame& frame, int max_disparity_px) {
+  constexpr int kWindow = 5;                // px
+  constexpr int kArea = kWindow * kWindow;  // the penalties are per pixel of the window
+  constexpr int kNumDisparityStep = 16;     // as OpenCV asks
+  const int num_disparities = (max_disparity_px + kNumDisparityStep - 1) / kNumDisparityStep * kNumDisparityStep;
+  const auto matcher = cv::StereoSGBM::create(0, num_disparities, kWindow, 8 * kArea, 32 * kArea, /*disp12MaxDiff=*/1,
+                                              /*preFilterCap=*/31, /*uniquenessRatio=*/10,
+                                              /*speckleWindowSize=*/100, /*speckleRange=*/2,
+                                              cv::StereoSGBM::MODE_SGBM_3WAY);  // the fastest
+  cv::setNumThreads(1);                                                         // parallelism is between processes
+  cv::Mat disparities;
+  matcher->compute(View(frame.left), View(frame.right), disparities);
+  return disparities;
+}
+
+DepthImage DepthOfStereo(const CameraFrame& frame, const CameraCalibration& camera, double unit_m,
+                         int max_disparity_px) {
+  const cv::Mat disparities = MatchDisparities(frame, max_disparity_px);
+  DepthImage depth(frame.left.width, frame.left.height);
+  for (int y = 0; y < depth.height; ++y) {
+    const auto* disparity = disparities.ptr<int16_t>(y);
+    uint16_t* counts = depth.row(y);
+    for (int x = 0; x < depth.width; ++x) {
+      if (disparity[x] <= 0) continue;
+      const double depth_m = 16.0 * camera.fx_px * camera.baseline_m / disparity[x];
+      counts[x] = static_cast<uint16_t>(std::min(kMaxCount, std::round(depth_m / unit_m)));
+    }
+  }
+  return depth;
+}
+
+}  // namespace
+
+Scan ScanFromImages(const CameraFrame& frame, const CameraCalibration& camera, const OccupancyOptions& options,
+                    int max_disparity_px) {
+  Scan scan{.camera = camera, .stride_px = StrideFor(camera, options)};
+  if (camera.sensor == SensorType::kRgbd) {
+    scan.depth_unit_m = camera.depth_unit_m;
+    scan.depth = Sample(frame.depth, scan.stride_px);
+  } else {
+    // Whatever is beyond the range is beyond it by any number.
+    scan.depth_unit_m = 2.0 * options.max_range / kMaxCount;
+    scan.depth = Sample(DepthOfStereo(frame, camera, scan.depth_unit_m, max_disparity_px), scan.stride_px);
+  }
+  scan.intensity = Sample(frame.left, scan.stride_px);
+  return scan;
+}
+
+Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe) {
+  Scan scan{.camera = keyframe.features->calibration};
+  const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (const Landmark* landmark = map.FindLandmark(id)) {
+      scan.landmarks_in_camera.push_back(camera_from_world * landmark->position_in_world);
+    }
+  }
+  return scan;
+}
+
+std::vector<ScanPoint> PointsOf(const Scan& scan) {
+  std::vector<ScanPoint> points;
+  for (const Eigen::Vector3d& landmark : scan.landmarks_in_camera) points.push_back({landmark, kUnknownIntensity});
+  for (int y = 0; y < scan.depth.height; ++y) {
+    for (int x = 0; x < scan.depth.width; ++x) {
+      const uint16_t count = scan.depth.row(y)[x];
+      if (count == 0) continue;
+      const Eigen::Vector2d pixel(scan.stride_px * x, scan.stride_px * y);
+      points.push_back({scan.depth_unit_m * count * scan.camera.Ray(pixel), scan.intensity.row(y)[x]});
+    }
+  }
+  return points;
+}
+
+}  // namespace tessera

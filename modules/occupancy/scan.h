@@ -1,0 +1,44 @@
+// What one keyframe measured of space: points in its camera frame, to each of which its rays go.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "geometry/camera_frame.h"
+#include "map/map.h"
+#include "occupancy/occupancy_options.h"
+
+namespace tessera {
+
+struct ScanPoint {
+  Eigen::Vector3d in_camera;  // m (mono: units of the map)
+  uint8_t intensity = 0;
+};
+
+// Three bytes for each pixel that is kept, whose rays are no farther apart than a voxel at the maximum range; or a few
+// hundred landmarks.
+struct Scan {
+  CameraCalibration camera;
+  int stride_px = 1;                                 // kept are the pixels (i, j) * stride_px
+  double depth_unit_m = 0.0;                         // of `depth`
+  DepthImage depth;                                  // at these pixels; 0: unknown
+  GrayImage intensity;                               // likewise
+  std::vector<Eigen::Vector3d> landmarks_in_camera;  // mono; then there are no images
+
+  bool operator==(const Scan&) const = default;
+};
+
+// From the depth image of an RGB-D frame, or from the two images of a stereo frame by semi-global matching of
+// disparities up to `max_disparity_px` (H. Hirschmueller, "Stereo Processing by Semiglobal Matching and Mutual
+// Information", PAMI 2008; OpenCV's StereoSGBM, in integers). The frame's images must have the camera's size.
+Scan ScanFromImages(const CameraFrame& frame, const CameraCalibration& camera, const OccupancyOptions& options,
+                    int max_disparity_px);
+
+// From the landmarks that a keyframe observes, in the order of its keypoints.
+Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe);
+
+// The points of a scan, in a fixed order.
+std::vector<ScanPoint> PointsOf(const Scan& scan);
+
+}  // namespace tessera
