@@ -9,8 +9,8 @@ namespace tessera {
 
 // PLY, binary and little-endian: a vertex per landmark, in the order of ids. x y z (float): meters (mono: units of the
 // map) in the world frame; nx ny nz (float): mean direction to the cameras that saw it; observations (int): how many
-// keyframes see it. No colors: the pipeline's images are gray. `world_from_map`: positions and directions are turned into
-// that world.
+// keyframes see it. No colors: the pipeline's images are gray. `world_from_map`: positions and directions are turned
+// into that world.
 std::string PlyFile(const Map& map, const Rigid3& world_from_map = Rigid3::Identity());
 
 }  // namespace tessera

@@ -195,8 +195,8 @@ void MakeRunFolder(const std::string& folder) {
   }
 }
 
-std::vector<std::string> WriteRun(const RunRecord& record, const std::string& folder,
-                                  const Rigid3& base_from_camera, const std::vector<RunFile>& more) {
+std::vector<std::string> WriteRun(const RunRecord& record, const std::string& folder, const Rigid3& base_from_camera,
+                                  const std::vector<RunFile>& more) {
   const auto tum = [&](const std::vector<StampedPose>& poses) { return TumText(poses, base_from_camera); };
   MakeRunFolder(folder);
   std::vector<std::string> not_written;
