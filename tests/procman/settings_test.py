@@ -12,6 +12,7 @@ from tessera_cli.supervision.write_limits import RUN_FOLDER, URLS, WRITTEN
 # Texts that name nothing that is written. A new setting belongs here or into write_limits.py.
 OTHER_TEXTS = {
     "bus.channel_prefix",
+    "bus.run_dir",  # a deputy puts its own in its place
     "camera.source",
     "camera.sensor",
     "camera.calibration",
@@ -19,6 +20,7 @@ OTHER_TEXTS = {
     "dispatcher.tiles",
     "extractor.robots",
     "tracker.replay_log",
+    "body.base_from_camera",
     "mapper.load_map",
     "loop_closer.vocabulary",
 }

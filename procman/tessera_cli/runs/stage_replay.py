@@ -37,7 +37,7 @@ ONLY_FOR = {"CAMERA": "dispatcher", "TILE": "extractor", "TILE_FEATURES": "reass
 NOT_COMPARED = (STATUS, HEARTBEAT, REPAIR, "EXTRACTOR_READY", "TILE_ACK", "MAP_REQUEST", "MAP_SNAPSHOT")
 NOT_REPLAYED = (STATUS, HEARTBEAT, REPAIR)
 # For measuring only, or different in each life of a process.
-MEASURED_FIELDS = ("header", "arrival", "map_wait_us")
+MEASURED_FIELDS = ("header", "captured", "latency", "map_wait_us")
 # The recorder may have heard an answer before the question: after so long without an answer, the next is asked.
 PATIENCE_S = 0.5
 # After this long without an answer behind the last input, it does not come.
@@ -45,7 +45,7 @@ ANSWER_TIMEOUT_S = 20.0
 # Inputs that may not have arrived are sent again, those of the last so many.
 NUM_REPEATED = 200
 MAX_REPAIRED = 100  # messages of one request
-BUS_KEYS = ("main_url", "camera_url", "work_url", "tile_url")
+BUS_KEYS = ("main_url", "camera_url", "work_url", "map_url", "tile_url")
 
 
 @dataclass
@@ -133,6 +133,7 @@ def _assignments(arguments: Namespace, log: Path, url: str) -> list[str]:
     return [
         *(f"bus.{key}={url}" for key in BUS_KEYS),
         f"bus.channel_prefix={arguments.prefix}",
+        "bus.run_dir=",
         f"tracker.replay_log={log}",
         *user_assignments(arguments),
     ]
