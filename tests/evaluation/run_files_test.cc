@@ -232,7 +232,7 @@ TEST_F(RunFilesTest, AFileThatCantBeWrittenLeavesTheOthersAndIsTold) {
   const auto fails = [](const std::string& path) { throw std::runtime_error("no room for " + path); };
   const auto works = [](const std::string& path) { WriteFile(path, "a map"); };
   const auto not_written =
-      WriteRun(SmallRun(), folder_, {{folder_ + "/map.tessera", fails}, {folder_ + "/copy.tessera", works}});
+      WriteRun(SmallRun(), folder_, {}, {{folder_ + "/map.tessera", fails}, {folder_ + "/copy.tessera", works}});
   ASSERT_EQ(not_written.size(), 3U);
   EXPECT_NE(not_written[0].find("trajectory.txt"), std::string::npos);
   EXPECT_EQ(not_written[1], "no room for " + folder_ + "/map.tessera");
@@ -246,7 +246,7 @@ TEST_F(RunFilesTest, AFileThatCantBeWrittenLeavesTheOthersAndIsTold) {
 TEST_F(RunFilesTest, SmallAndPreciousFilesAreThereBeforeTheMaps) {
   std::string run_json;
   const auto look = [&](const std::string&) { run_json = Read("run.json"); };
-  EXPECT_TRUE(WriteRun(SmallRun(), folder_, {{folder_ + "/map.tessera", look}}).empty());
+  EXPECT_TRUE(WriteRun(SmallRun(), folder_, {}, {{folder_ + "/map.tessera", look}}).empty());
   EXPECT_EQ(run_json, Read("run.json"));
   EXPECT_TRUE(nlohmann::json::parse(run_json)["not_written"].empty());
 }

@@ -6,6 +6,7 @@ What the stack consists of, the order in which it starts and what is restarted i
 import shutil
 import time
 from argparse import Namespace
+from contextlib import ExitStack
 from pathlib import Path
 
 from tessera_cli.cluster.keys import key_folder
@@ -48,13 +49,18 @@ def run_stack(arguments: Namespace, present: Present) -> int:
     folder = choose_folder(arguments.out, source)
     is_new = not folder.exists()
     lock = _choose_port(arguments, source)
+    launcher: Launcher | None = None
+    cleanup = ExitStack()
     try:
-        return _run_in(folder, arguments, source, present)
+        launcher = _make_launcher(arguments, source, folder, present, cleanup)
+        return launcher.run()
     except UserError:
-        if is_new:
-            _remove_unused(folder)
+        # Arguments or input were at fault from the beginning: the sentence says all, and nothing is to be kept.
+        if is_new and (launcher is None or not launcher.has_poses):
+            shutil.rmtree(folder, ignore_errors=True)
         raise
     finally:
+        cleanup.close()
         del lock
 
 
@@ -73,7 +79,10 @@ def _choose_port(arguments: Namespace, source: Source) -> PortLock | None:
     return lock
 
 
-def _run_in(folder: Path, arguments: Namespace, source: Source, present: Present) -> int:
+def _make_launcher(
+    arguments: Namespace, source: Source, folder: Path, present: Present, cleanup: ExitStack
+) -> "Launcher":
+    """`cleanup`: gets what is to be done when the run is over."""
     process_list = read_process_list(PROCESS_LIST, _counts(arguments, source))
     assignments = process_list.settings + run_assignments(arguments, source, folder)
     logs = LogFolder(folder / "stages", f"another run writes into {folder}: give another --out DIR.")
@@ -81,13 +90,10 @@ def _run_in(folder: Path, arguments: Namespace, source: Source, present: Present
         require_no_run(folder)
     remove_earlier_run(folder)
     values = write_settings(assignments, folder / "settings.yaml")
-    run_dir = _take_bus(arguments, source, values)
-    try:
-        deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
-        return Launcher(arguments, source, folder, values, deputy, present).run()
-    finally:
-        if run_dir:
-            run_dir.end()
+    if run_dir := _take_bus(arguments, source, values):
+        cleanup.callback(run_dir.end)
+    deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
+    return Launcher(arguments, source, folder, values, deputy, present)
 
 
 def _take_bus(arguments: Namespace, source: Source, values: Settings) -> RunDir | None:
@@ -104,12 +110,6 @@ def _take_bus(arguments: Namespace, source: Source, values: Settings) -> RunDir 
     if run_dir:
         run_dir.make(pool_secret(key_folder()) if shares_extractors else draw_secret())
     return run_dir
-
-
-def _remove_unused(folder: Path) -> None:
-    """The folder of a run that never began: arguments or input were at fault, and the sentence says all."""
-    if not any((folder / name).exists() for name in ("run.json", "run.lcmlog")):
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _counts(arguments: Namespace, source: Source) -> dict[str, int]:
@@ -179,6 +179,10 @@ class Launcher:
         if self._arguments.localize_only:
             return f"{said}: is the map of this place, and of this camera?"
         return f"{said}: is the camera moving, are its images sharp, and is its calibration right?"
+
+    @property
+    def has_poses(self) -> bool:
+        return self._monitor.progress.num_poses > 0
 
     def _wall_s(self, began: float) -> float:
         """From the camera's start to the last pose."""
