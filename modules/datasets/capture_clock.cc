@@ -6,6 +6,8 @@ namespace tessera {
 
 int64_t CaptureClock::CapturedUs(int64_t stamp_us, int64_t arrival_us) {
   const bool stands_still = last_stamp_us_ == stamp_us;  // a stream without stamps
+  const bool begins_anew = last_stamp_us_ && stamp_us < *last_stamp_us_;
+  if (begins_anew) offsets_.clear();
   last_stamp_us_ = stamp_us;
   const bool is_of_host = has_host_stamps_ && stamp_us <= arrival_us && arrival_us - stamp_us < kMaxDelayUs;
   const int64_t captured_us =

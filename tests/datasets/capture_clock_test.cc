@@ -48,5 +48,13 @@ TEST(CaptureClock, TimeGoesOn) {
   EXPECT_GT(clock.CapturedUs(0, 2'000), first_us);
 }
 
+TEST(CaptureClock, AlsoAfterAShortWhile) {
+  CaptureClock clock(false);
+  EXPECT_EQ(clock.CapturedUs(20'000, 1'000'000), 1'000'000);
+  EXPECT_EQ(clock.CapturedUs(100'000, 1'080'000), 1'080'000);
+  // The camera was away for a second, and counts from its start again.
+  EXPECT_EQ(clock.CapturedUs(20'000, 2'100'000), 2'100'000);
+}
+
 }  // namespace
 }  // namespace tessera
