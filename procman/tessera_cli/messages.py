@@ -67,6 +67,18 @@ __all__ = [
 # Every message begins with what tells its type.
 FINGERPRINT_BYTES, MAX_HEADER_BYTES = 8, 1000
 
+# What no member of a run has signed. (Arrays of bytes that LCM generates are empty at first, and then can't be encoded.)
+UNSIGNED = bytes(16)
+_make_header = header_t.__init__
+
+
+def _make_unsigned_header(header: header_t) -> None:
+    _make_header(header)
+    header.tag = UNSIGNED
+
+
+header_t.__init__ = _make_unsigned_header  # type: ignore[method-assign]
+
 # What generated code raises on bytes that are no such message.
 _DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
 

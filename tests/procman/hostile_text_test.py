@@ -15,8 +15,10 @@ from helpers.made_run import write_run
 from helpers.nodes import MakeNode, Node
 from helpers.page import Page
 from helpers.stack import Tessera
+from tessera_cli.cluster.keys import KeyRing, key_folder
 from tessera_cli.constants import PORT_OFFSETS, PROCMAN_OUTPUT, PROCMAN_STATUS, STATUS
 from tessera_cli.lcm_bus import Bus, bus_url
+from tessera_cli.membership import TAG_BYTES
 from tessera_cli.messages import (
     procman_list_t,
     procman_output_t,
@@ -28,6 +30,7 @@ from tessera_cli.messages import (
 from tessera_cli.report.html_report import write_report
 from tessera_cli.runs.live_view import RunPanel
 from tessera_cli.runs.run_folder import read_run
+from tessera_cli.supervision.signatures import KEY_BYTES, SIGNATURE_BYTES, sign
 from tessera_cli.supervision.stack_monitor import StackMonitor
 from tessera_cli.supervision.watch import Watcher
 from tessera_cli.text import visible, visible_lines, visible_values
@@ -69,6 +72,8 @@ def hostile_status() -> procman_status_t:
     status.nonce = bytes(16)
     status.num_kinds, status.kinds, status.num_refused = 1, [HOSTILE], [3]
     status.num_lists, status.lists = 1, [each]
+    status.header.tag, status.header.num_parts = bytes(TAG_BYTES), 1
+    status.key, status.signature = bytes(KEY_BYTES), bytes(SIGNATURE_BYTES)
     return status
 
 
@@ -80,16 +85,20 @@ def test_texts_of_messages_within_messages_too() -> None:
 
 @pytest.fixture
 def port(tessera: Tessera) -> Iterator[int]:
-    """Of a bus on which somebody says hostile things all the time."""
+    """Of a bus on which somebody who is trusted says hostile things all the time."""
     port, is_over = tessera.next_port(), threading.Event()
+    ring = KeyRing(key_folder())
+    ring.make()
+    key = ring.signing_key()
     bus = Bus(bus_url(port + PORT_OFFSETS["procman"]), "somebody")
     output = procman_output_t()
     output.deputy = output.process = output.text = HOSTILE
 
     def talk() -> None:
         while not is_over.wait(0.2):
-            bus.publish(PROCMAN_STATUS, hostile_status().encode())
-            bus.publish(PROCMAN_OUTPUT, output.encode())
+            for channel, message in ((PROCMAN_STATUS, hostile_status()), (PROCMAN_OUTPUT, output)):
+                message.header = bus.header(channel)
+                bus.publish(channel, sign(message, key))
 
     thread = threading.Thread(target=talk)
     thread.start()
@@ -117,7 +126,7 @@ def test_watch(port: int) -> None:
 def test_watch_listens_to_no_bus_that_is_none(tessera: Tessera, url: str, prefix: str) -> None:
     watcher, status = Watcher(Namespace(port=tessera.next_port(), lan=False)), hostile_status()
     status.lists[0].main_url, status.lists[0].channel_prefix = url, prefix
-    watcher._sheriff._on_status(status)
+    watcher._sheriff._on_status(sign(status, KeyRing(key_folder()).signing_key()))
     watcher._follow_lists()
     assert watcher._monitors == {}
 

@@ -72,7 +72,7 @@ class BusScene:
         curves = {
             f"{INLIERS}/matches": message.num_matches,
             f"{INLIERS}/inliers": message.num_inliers,
-            f"{LATENCY}/latency": 1e-3 * (message.header.utime - message.arrival),
+            f"{LATENCY}/latency": 1e-3 * message.latency,
             f"{LATENCY}/map_wait": 1e-3 * message.map_wait_us,
         }
         shown: list[Shown] = [_curve(path, moment, value) for path, value in curves.items()]

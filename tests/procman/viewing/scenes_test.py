@@ -97,7 +97,7 @@ def make_pose_message(frame: int, x: float, reference: int = 0) -> Any:
     pose.frame, pose.utime, pose.state = frame, 100_000 * frame, pose.TRACKED
     pose.world_from_camera, pose.reference_keyframe = make_pose((x, 0.0, 0.0)), reference
     pose.reference_from_camera = make_pose((x, 0.0, 0.0))
-    pose.num_inliers, pose.header.utime, pose.arrival = 123, 50_000, 20_000
+    pose.num_inliers, pose.latency = 123, 30_000
     return received(pose)
 
 
