@@ -67,7 +67,7 @@ __all__ = [
 # Every message begins with what tells its type.
 FINGERPRINT_BYTES, MAX_HEADER_BYTES = 8, 1000
 
-# What no member of a run has signed. (Arrays of bytes that LCM generates are empty at first, and then can't be encoded.)
+# What no member of a run has signed. (Arrays of bytes that LCM generates are empty at first: none can be encoded.)
 UNSIGNED = bytes(16)
 _make_header = header_t.__init__
 
@@ -77,7 +77,7 @@ def _make_unsigned_header(header: header_t) -> None:
     header.tag = UNSIGNED
 
 
-header_t.__init__ = _make_unsigned_header  # type: ignore[method-assign]
+header_t.__init__ = _make_unsigned_header
 
 # What generated code raises on bytes that are no such message.
 _DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)

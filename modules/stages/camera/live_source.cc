@@ -27,8 +27,8 @@ int64_t NowUs() {
 }  // namespace
 
 struct LiveSource::Shared {
-  Shared(const LiveSourceOptions& of_run, CameraCalibration of_camera)
-      : options(of_run), calibration(std::move(of_camera)), clock(of_run.has_host_stamps) {}
+  Shared(const LiveSourceOptions& of_run, const CameraCalibration& of_camera)
+      : options(of_run), calibration(of_camera), clock(of_run.has_host_stamps) {}
 
   // Returns whether more are wanted.
   bool Take(CameraFrame frame);
