@@ -30,6 +30,13 @@ run_pytest() (
   PYTHONPATH="$root/procman" .venv/bin/python -P -m pytest -p no:cacheprovider -rs tests
 )
 
+NOT_SANITIZED='^(simulation|stages)$'
+
+# Programs of the unit tests.
+sanitized_tests() {
+  sed -nE 's/^tessera_test\(([a-z_]+).*/\1/p' "$root"/tests/*/CMakeLists.txt | grep -vE "$NOT_SANITIZED" | sed 's/$/_test/'
+}
+
 # run_sanitized LIST: the C++ tests in a build of their own, under these sanitizers of the compiler. Without the recorded
 # sequences: those runs are long, and the same code is tested on made ones.
 run_sanitized() {
@@ -37,11 +44,12 @@ run_sanitized() {
   prepare ask
   configure "$folder" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DTESSERA_SANITIZE="$1" \
     -DTESSERA_DATA="$root/$folder/no-data"
-  build_in "$folder" tessera_tests
+  # shellcheck disable=SC2046 # one word for each
+  build_in "$folder" $(sanitized_tests)
   finish_setup
   export ASAN_OPTIONS=detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=second_deadlock_stack=1
   # The unit tests: rendered worlds and whole pipelines take many minutes there (ctest --test-dir FOLDER runs them too).
-  check "C++ tests, sanitized: $1" ctest --test-dir "$root/$folder" --output-on-failure -j "$(nproc)" -E '^(simulation|stages)$'
+  check "C++ tests, sanitized: $1" ctest --test-dir "$root/$folder" --output-on-failure -j "$(nproc)" -E "$NOT_SANITIZED"
   tell_failures
 }
 

@@ -13,7 +13,9 @@ import pytest
 
 from helpers.stack import FIRST_PORT, NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera
 from tessera_cli import settings
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.files import BIN
+from tessera_cli.membership import pool_secret
 from tessera_cli.supervision.progress import RUNNING
 from tessera_cli.supervision.stack_monitor import StackMonitor
 
@@ -120,8 +122,8 @@ class Robot(Processes):
 
 
 class Pool(Processes):
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder, ["extractor.robots=a_,b_"])
+    def __init__(self, folder: Path, *assignments: str) -> None:
+        super().__init__(folder, ["extractor.robots=a_,b_", *assignments])
         for number in range(NUM_EXTRACTORS):
             self.start("extractor", number)
         self.wait_until_running()
@@ -154,8 +156,8 @@ class Starter:
         self._folder = folder
         self._started: list[Processes] = []
 
-    def pool(self) -> Pool:
-        pool = Pool(self._folder / "pool")
+    def pool(self, *assignments: str) -> Pool:
+        pool = Pool(self._folder / "pool", *assignments)
         self._started.append(pool)
         return pool
 
@@ -217,7 +219,9 @@ def test_robots_come_and_go_and_come_again(
 def test_tessera_run_takes_the_extractors_of_a_pool(
     start: Starter, tessera: Tessera, sequence: Path, reference_run: Finished
 ) -> None:
-    start.pool()
+    """The extractors know the secret that all runs of this user with shared extractors have."""
+    pool_secret(key_folder())
+    start.pool(f"bus.run_dir={key_folder() / 'runs' / 'pool'}")
     out = tessera.next_folder().with_name("with a pool")
     tessera.command(
         "run", f"kitti:{sequence}", "--extractors", 0, "--prefix", "a_", "--port", PORT, "--out", out

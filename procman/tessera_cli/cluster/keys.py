@@ -7,6 +7,7 @@ created when first needed, and the user's own key is the first one trusted: on o
 
 import base64
 import binascii
+import fcntl
 import os
 import re
 from pathlib import Path
@@ -51,8 +52,7 @@ class KeyRing:
 
     def signing_key(self) -> SigningKey:
         """Created by the first call."""
-        if not self.secret_path.exists():
-            self.make()
+        self._make_first()
         if self.secret_path.stat().st_mode & 0o077:
             raise UserError(f"{self.secret_path} can be read by others; do: chmod 600 {self.secret_path}")
         return SigningKey(self._parse(self.secret_path.read_text().strip(), str(self.secret_path)))
@@ -65,18 +65,31 @@ class KeyRing:
         key = SigningKey.generate()
         try:
             self.secret_path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            self.secret_path.unlink(missing_ok=True)
-            descriptor = os.open(self.secret_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            write_private(self.secret_path, (to_text(key.encode()) + "\n").encode())
         except OSError as error:
             raise UserError(f"the key {self.secret_path} can't be written: {error.strerror}.") from error
-        with os.fdopen(descriptor, "w") as file:
-            file.write(to_text(key.encode()) + "\n")
         self._write({**self._read(), OWN_NAME: key.verify_key.encode()})
+
+    def _make_first(self) -> None:
+        """Once, also where several deputies of a user start at the same time."""
+        if self.secret_path.exists():
+            return
+        try:
+            self.secret_path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            folder = os.open(self.secret_path.parent, os.O_RDONLY)
+        except OSError as error:
+            raise UserError(f"the key {self.secret_path} can't be written: {error.strerror}.") from error
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX)
+            if not self.secret_path.exists():
+                self.make()
+        finally:
+            os.close(folder)
 
     def trusted(self) -> dict[str, bytes]:
         """Public keys by name; this user's own is among them unless it was revoked."""
-        if not self.secret_path.exists() and not self.trusted_path.exists():
-            self.make()
+        if not self.trusted_path.exists():
+            self._make_first()
         return self._read()
 
     def trust(self, name: str, text: str) -> None:

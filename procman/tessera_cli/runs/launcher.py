@@ -216,7 +216,7 @@ class Launcher:
         is_told = False
         while not progress.is_finished:
             self._look(view)
-            if progress.is_evaluated and not is_told:
+            if progress.is_evaluated and "occupancy" in progress.stages and not is_told:
                 view.say("all frames are done; the occupancy map is being completed")
                 is_told = True
             view.update(progress)

@@ -213,7 +213,6 @@ def test_more_runs_than_colors(tmp_path: Path, number: int) -> None:
             },
             "in 2 parts that nothing joins: the largest has 21 keyframes and places 100 frames; the positions of 9",
         ),
-        ({"frames_tracked": 0}, "No pose was found for any of 120 frames"),
         ({"messages_repaired": 1}, "1 message got lost on the network and was"),
         ({"messages_lost": 2}, "2 messages stayed lost"),
         ({"messages_undecodable": 5}, "5 messages could not be decoded"),
@@ -225,6 +224,12 @@ def test_more_runs_than_colors(tmp_path: Path, number: int) -> None:
 )
 def test_what_went_wrong_is_told(tmp_path: Path, change: dict[str, Any], sentence: str) -> None:
     assert any(sentence in remark for remark in remarks(read_run(write_run(tmp_path / "drive", **change))))
+
+
+def test_a_run_without_a_pose_says_so_first(tmp_path: Path) -> None:
+    assert headline(read_run(write_run(tmp_path / "drive", frames_tracked=0)))[0] == (
+        "No pose was found for any of 120 frames."
+    )
 
 
 def test_what_processes_reported_is_told(tmp_path: Path) -> None:
