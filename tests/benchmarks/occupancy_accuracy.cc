@@ -133,9 +133,6 @@ Cell CellOf(const Eigen::Vector3d& point, double edge) {
   }
   return cell;
 }
-Eigen::Vector3d CenterOf(const Cell& cell, double edge) {
-  return edge * Eigen::Vector3d(cell[0] + 0.5, cell[1] + 0.5, cell[2] + 0.5);
-}
 
 void AddImage(const CameraFrame& frame, const CameraCalibration& camera, const Rigid3& run_from_camera, double range_m,
               double edge, Surface& surface) {
