@@ -29,7 +29,7 @@ class CaptureClock {
 
   // Clocks drift by 0.1 ms in this time, and something fast comes within it.
   static constexpr int64_t kWindowUs = 10'000'000;
-  // A stamp that is farther off is of another clock, or the stream began anew; as it did where stamps go back.
+  // A stamp that is farther off is of another clock. Where stamps go back, the stream began anew.
   static constexpr int64_t kMaxDelayUs = 2'000'000;
 
  private:

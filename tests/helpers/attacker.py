@@ -282,7 +282,6 @@ def other_stack(attacker: Attacker) -> None:
 def bad_name(attacker: Attacker) -> None:
     message = attacker.like("STATUS", "mapper")
     message.name = "mapper?"
-    message.header.tag = message.header.tag or bytes(16)
     attacker.send_bytes("STATUS", message.encode().replace(b"mapper?", b"mapper\xff"))
 
 

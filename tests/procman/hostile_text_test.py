@@ -18,7 +18,6 @@ from helpers.stack import Tessera
 from tessera_cli.cluster.keys import KeyRing, key_folder
 from tessera_cli.constants import PORT_OFFSETS, PROCMAN_OUTPUT, PROCMAN_STATUS, STATUS
 from tessera_cli.lcm_bus import Bus, bus_url
-from tessera_cli.membership import TAG_BYTES
 from tessera_cli.messages import (
     procman_list_t,
     procman_output_t,
@@ -72,7 +71,7 @@ def hostile_status() -> procman_status_t:
     status.nonce = bytes(16)
     status.num_kinds, status.kinds, status.num_refused = 1, [HOSTILE], [3]
     status.num_lists, status.lists = 1, [each]
-    status.header.tag, status.header.num_parts = bytes(TAG_BYTES), 1
+    status.header.num_parts = 1
     status.key, status.signature = bytes(KEY_BYTES), bytes(SIGNATURE_BYTES)
     return status
 

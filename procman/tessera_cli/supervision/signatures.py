@@ -13,7 +13,6 @@ from nacl.exceptions import BadSignatureError
 from nacl.signing import SigningKey, VerifyKey
 
 from tessera_cli.constants import MAX_ORDER_BYTES
-from tessera_cli.membership import TAG_BYTES
 from tessera_cli.messages import decode, procman_order_t, procman_output_t, procman_status_t, receive
 
 KEY_BYTES, SIGNATURE_BYTES = 32, 64
@@ -27,7 +26,6 @@ CONTEXTS = {
 
 def sign(message: Any, key: SigningKey) -> bytes:
     """The encoded message; its key and signature are filled in."""
-    message.header.tag = bytes(TAG_BYTES)  # for members of a run only
     message.key, message.signature = key.verify_key.encode(), bytes(SIGNATURE_BYTES)
     signed = message.encode()[:-SIGNATURE_BYTES]
     message.signature = key.sign(CONTEXTS[type(message)] + signed).signature

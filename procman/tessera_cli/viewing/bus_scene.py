@@ -16,6 +16,7 @@ from tessera_cli.viewing import keypoints, map_shapes
 from tessera_cli.viewing.live_path import LivePath
 from tessera_cli.viewing.scene import (
     CAMERA,
+    CAMERA_SIZE,
     GRAY,
     HERE,
     IMAGE,
@@ -36,7 +37,6 @@ from tessera_cli.viewing.scene import (
     Shown,
 )
 
-CAMERA_SIZE = 2.0
 # Frames whose image or features wait for their pose; and keyframes whose landmarks the next frame may show.
 MAX_WAITING = 16
 NUM_NEIGHBORS = 12

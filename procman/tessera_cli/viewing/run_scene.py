@@ -15,6 +15,7 @@ from tessera_cli.runs.trajectories import Trajectory, truth_in_estimate
 from tessera_cli.viewing import keypoints, map_shapes
 from tessera_cli.viewing.scene import (
     CAMERA,
+    CAMERA_SIZE,
     ERROR,
     GRAY,
     IMAGE,
@@ -32,9 +33,6 @@ from tessera_cli.viewing.scene import (
     Series,
     Shown,
 )
-
-# Of the current camera, in depths of keyframes.
-CAMERA_SIZE = 2.0
 
 
 def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:

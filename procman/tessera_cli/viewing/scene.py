@@ -62,6 +62,10 @@ class Lines:
     moment: Moment | None = None
 
 
+# Of the current camera, in depths of keyframes.
+CAMERA_SIZE = 2.0
+
+
 @dataclass(frozen=True)
 class Camera:
     """The camera as a frustum of this depth."""
