@@ -5,16 +5,6 @@
 
 namespace tessera {
 
-int64_t WorkOf(const TileJob& job) {
-  auto num_pixels = static_cast<int64_t>(job.left.pixels.size() + job.right.pixels.size() + job.depth.pixels.size());
-  int64_t work = 0;
-  for (int32_t level = 0; level <= job.last_level; ++level) {
-    work += num_pixels * (level >= job.first_level ? kSearchedPixel : 1);
-    num_pixels = num_pixels * 25 / 36;  // each level is 5/6 of the one below in both directions
-  }
-  return std::max<int64_t>(work, 1);
-}
-
 bool FairQueue::Push(size_t robot, int64_t work, TileJob job) {
   Line& line = lines_[robot];
   if (line.jobs.size() >= kMaxWaiting) return false;

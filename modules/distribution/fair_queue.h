@@ -24,11 +24,6 @@
 
 namespace tessera {
 
-// What the job costs, in pixels of all pyramid levels that are made for it: those that are only reduced to get to the
-// next one count once, those that are searched kSearchedPixel times.
-int64_t WorkOf(const TileJob& job);
-inline constexpr int64_t kSearchedPixel = 5;  // measured on KITTI: 1.8 against 0.37 ns
-
 class FairQueue {
  public:
   static constexpr size_t kMaxWaiting = 64;  // jobs of one robot; its dispatcher gives two at a time

@@ -5,13 +5,6 @@
 #include <utility>
 
 namespace tessera {
-namespace {
-
-size_t NumPixels(const TileJob& job) {
-  return job.left.pixels.size() + job.right.pixels.size() + job.depth.pixels.size();
-}
-
-}  // namespace
 
 Result<> WorkQueueOptions::Check() const {
   if (max_queued_frames < 1) return Failed("at least one frame must fit the queue");
@@ -137,15 +130,12 @@ void WorkQueue::CheckExtractors(int64_t now_us) {
   }
 }
 
-// Cuts the oldest waiting frame. The largest jobs come first, so that none is left to run alone at the end.
+// Cuts the oldest waiting frame.
 void WorkQueue::CutNextFrame() {
   Waiting next = std::move(waiting_.front());
   waiting_.pop_front();
-  std::vector<TileJob> jobs = CutFrame(next.frame, next.calibration, next.captured_us, options_.grid,
-                                       options_.coarse_levels_from, options_.features);
-  std::stable_sort(jobs.begin(), jobs.end(),
-                   [](const TileJob& a, const TileJob& b) { return NumPixels(a) > NumPixels(b); });
-  for (TileJob& job : jobs) {
+  for (TileJob& job : CutFrame(next.frame, next.calibration, next.captured_us, options_.grid,
+                               options_.coarse_levels_from, options_.features)) {
     job.previous_frame = next.previous_frame;
     const JobKey key{job.frame, job.tile};
     jobs_[key].job = std::move(job);

@@ -55,9 +55,10 @@ TileFeatures Extractor::Extract(const TileJob& job) {
 
 void Extractor::BuildPyramids(const TileJob& job) {
   const bool is_stereo = job.calibration.sensor == SensorType::kStereo;
-  CopyRegion(job.left, job.left_rect, plan_.levels[0].left, left_[0]);
-  if (is_stereo) CopyRegion(job.right, job.right_rect, plan_.levels[0].right, right_[0]);
-  for (auto level = size_t{1}; level <= static_cast<size_t>(job.last_level); ++level) {
+  const auto first = static_cast<size_t>(job.first_level);
+  CopyRegion(job.left, job.left_rect, plan_.levels[first].left, left_[first]);
+  if (is_stereo) CopyRegion(job.right, job.right_rect, plan_.levels[first].right, right_[first]);
+  for (size_t level = first + 1; level <= static_cast<size_t>(job.last_level); ++level) {
     left_[level].Reset(plan_.levels[level].left);
     reducer_.Reduce(left_[level - 1], left_[level]);
     if (!is_stereo) continue;

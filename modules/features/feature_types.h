@@ -90,9 +90,9 @@ struct TileJob {
   int32_t first_level = 0;  // levels first_level .. last_level are to be extracted
   int32_t last_level = 0;
   Rect core;         // level-0 rectangle that the tile owns: it answers for the cells whose center lies in it
-  Rect left_rect;    // level-0 pixels in `left`: the core and the margins it needs
+  Rect left_rect;    // pixels of first_level in `left`: those of the core and the margins it needs
   GrayImage left;    // left_rect of the left image
-  Rect right_rect;   // stereo: level-0 pixels in `right`
+  Rect right_rect;   // stereo: pixels of first_level in `right`
   GrayImage right;   // stereo: right_rect of the right image
   Rect depth_rect;   // RGB-D: level-0 pixels in `depth`
   DepthImage depth;  // RGB-D: depth_rect of the depth image

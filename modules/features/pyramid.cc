@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "features/simd.h"
 
@@ -129,6 +130,21 @@ void PyramidReducer::Reduce(const LevelImage& below, LevelImage& out) {
     const uint16_t* next = HorizontalRow(below, SourcePixel(y) + 1);
     CombineRows(above, next, SourceTenths(y), width, out.At(first_x_, y));
   }
+}
+
+GrayImage ReduceToLevel(const GrayImage& image, int level) {
+  const Rect whole{.x = 0, .y = 0, .width = image.width, .height = image.height};
+  PyramidReducer reducer;
+  LevelImage reduced;
+  CopyRegion(image, whole, whole, reduced);
+  for (int l = 1; l <= level; ++l) {
+    LevelImage below = std::exchange(reduced, {});
+    reduced.Reset({.x = 0, .y = 0, .width = LevelSize(image.width, l), .height = LevelSize(image.height, l)});
+    reducer.Reduce(below, reduced);
+  }
+  GrayImage out(reduced.region().width, reduced.region().height);
+  for (int y = 0; y < out.height; ++y) std::memcpy(out.row(y), reduced.At(0, y), static_cast<size_t>(out.width));
+  return out;
 }
 
 }  // namespace tessera

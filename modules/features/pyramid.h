@@ -84,7 +84,7 @@ class LevelImage {
   std::vector<uint8_t> bytes_;
 };
 
-// Copies `region` of level 0 from `pixels`, which is the part `rect` of the image and holds the region.
+// Copies `region` of a level from `pixels`, which is the part `rect` of the level and holds the region.
 void CopyRegion(const GrayImage& pixels, const Rect& rect, const Rect& region, LevelImage& out);
 
 // Computes the pixels of out.region() from the level below, which must hold their SourceIntervals.
@@ -100,5 +100,8 @@ class PyramidReducer {
   int rows_y_[2] = {0, 0};         // the rows of the level below ...
   std::vector<uint16_t> rows_[2];  // ... that are held here, reduced horizontally, in tenths
 };
+
+// The whole of a level, of the whole image.
+GrayImage ReduceToLevel(const GrayImage& image, int level);
 
 }  // namespace tessera

@@ -84,11 +84,11 @@ TilePlan PlanTile(const CameraCalibration& calibration, const FeatureOptions& op
   Interval depth_y;
   Rect left_above;
   Rect right_above;
-  for (int level = last_level; level >= 0; --level) {
+  for (int level = last_level; level >= first_level; --level) {
     LevelPlan& level_plan = plan.levels[static_cast<size_t>(level)];
     level_plan.width = LevelSize(calibration.width_px, level);
     level_plan.height = LevelSize(calibration.height_px, level);
-    if (level >= first_level) PlanCells(level_plan, core, level);
+    PlanCells(level_plan, core, level);
     if (!level_plan.corners.empty()) PlanPixels(level_plan, options, level);
     level_plan.left = left_above = WithSource(level_plan.left, left_above);
     level_plan.right = right_above = WithSource(level_plan.right, right_above);

@@ -54,13 +54,14 @@ struct LevelPlan {
 };
 
 struct TilePlan {
-  std::array<LevelPlan, kMaxLevels> levels;  // those up to the tile's last level are set
+  std::array<LevelPlan, kMaxLevels> levels;  // those from the tile's first to its last level are set
   Rect depth;                                // RGB-D: level-0 pixels at which depth may be read
 
   bool HasCells() const;
 };
 
-// `core` is a level-0 rectangle inside the image; the levels must be in range of the options.
+// `core` is a level-0 rectangle inside the image; the levels must be in range of the options. The pixels that a job
+// brings are those of its first level: the levels below are of no use to it.
 TilePlan PlanTile(const CameraCalibration& calibration, const FeatureOptions& options, const Rect& core,
                   int first_level, int last_level);
 

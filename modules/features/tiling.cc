@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <functional>
 
 #include "core/errors.h"
+#include "features/pyramid.h"
 #include "features/tile_plan.h"
 
 namespace tessera {
@@ -14,12 +16,13 @@ bool Contains(const Rect& outer, const Rect& inner) {
                            inner.bottom() <= outer.bottom());
 }
 
-// The rectangle has sane numbers and lies within an image of this size; it may be empty.
-bool LiesWithin(const Rect& rect, const CameraCalibration& calibration) {
+// The rectangle has sane numbers and lies within a level of the images; it may be empty.
+bool LiesWithin(const Rect& rect, const CameraCalibration& calibration, int level) {
   const auto is_part = [](int begin, int size, int whole) {
     return begin >= 0 && size >= 0 && begin <= whole && size <= whole - begin;
   };
-  return is_part(rect.x, rect.width, calibration.width_px) && is_part(rect.y, rect.height, calibration.height_px);
+  return is_part(rect.x, rect.width, LevelSize(calibration.width_px, level)) &&
+         is_part(rect.y, rect.height, LevelSize(calibration.height_px, level));
 }
 
 template <class Pixel>
@@ -28,11 +31,11 @@ bool HasSize(const Image<Pixel>& image, int width, int height) {
          image.pixels.size() == static_cast<size_t>(width) * static_cast<size_t>(height);
 }
 
-// The pixels of one image of a job.
+// The pixels of one image of a job, which are of this level.
 template <class Pixel>
-Result<> CheckPixels(const std::string& name, const CameraCalibration& calibration, const Rect& rect,
+Result<> CheckPixels(const std::string& name, const CameraCalibration& calibration, int level, const Rect& rect,
                      const Image<Pixel>& image, const Rect& needed) {
-  if (!LiesWithin(rect, calibration)) return Failed("the " + name + " rectangle leaves the image");
+  if (!LiesWithin(rect, calibration, level)) return Failed("the " + name + " rectangle leaves the image");
   if (!HasSize(image, rect.width, rect.height)) {
     return Failed("the " + name + " pixels are not as many as the rectangle's");
   }
@@ -51,29 +54,37 @@ Result<> CheckNumbers(const TileJob& job) {
     return Failed("levels " + std::to_string(job.first_level) + " to " + std::to_string(job.last_level) +
                   " are not a range of the pyramid's " + std::to_string(job.options.num_levels));
   }
-  if (!LiesWithin(job.core, job.calibration)) return Failed("the core leaves the image");
+  if (!LiesWithin(job.core, job.calibration, 0)) return Failed("the core leaves the image");
   return {};
 }
 
 Result<> CheckImages(const TileJob& job) {
   const TilePlan plan = PlanTile(job.calibration, job.options, job.core, job.first_level, job.last_level);
-  TESSERA_RETURN_IF_FAILED(CheckPixels("left", job.calibration, job.left_rect, job.left, plan.levels[0].left));
+  const int level = job.first_level;
+  const LevelPlan& needed = plan.levels[static_cast<size_t>(level)];
+  TESSERA_RETURN_IF_FAILED(CheckPixels("left", job.calibration, level, job.left_rect, job.left, needed.left));
   if (job.calibration.sensor == SensorType::kStereo) {
-    return CheckPixels("right", job.calibration, job.right_rect, job.right, plan.levels[0].right);
+    return CheckPixels("right", job.calibration, level, job.right_rect, job.right, needed.right);
   }
   if (job.calibration.sensor == SensorType::kRgbd) {
-    return CheckPixels("depth", job.calibration, job.depth_rect, job.depth, plan.depth);
+    return CheckPixels("depth", job.calibration, 0, job.depth_rect, job.depth, plan.depth);
   }
   return {};
 }
 
-// Rectangles and pixels of the job, for the core that it has.
+// Part of a level of the image.
+GrayImage CropLevel(const GrayImage& image, int level, const Rect& rect) {
+  return level == 0 ? Crop(image, rect) : Crop(ReduceToLevel(image, level), rect);
+}
+
+// Rectangles and pixels of the job, for the core and the levels that it has.
 void TakePixels(const CameraFrame& frame, TileJob& job, const TilePlan& plan) {
-  job.left_rect = plan.levels[0].left;
-  job.left = Crop(frame.left, job.left_rect);
+  const LevelPlan& needed = plan.levels[static_cast<size_t>(job.first_level)];
+  job.left_rect = needed.left;
+  job.left = CropLevel(frame.left, job.first_level, job.left_rect);
   if (job.calibration.sensor == SensorType::kStereo) {
-    job.right_rect = plan.levels[0].right;
-    job.right = Crop(frame.right, job.right_rect);
+    job.right_rect = needed.right;
+    job.right = CropLevel(frame.right, job.first_level, job.right_rect);
   }
   if (job.calibration.sensor == SensorType::kRgbd) {
     job.depth_rect = plan.depth;
@@ -151,11 +162,22 @@ std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration&
     }
   }
   if (jobs.empty()) add(whole, 0, options.num_levels - 1, true);  // every frame has an answer
+  std::ranges::stable_sort(jobs, std::greater(), WorkOf);
   for (size_t tile = 0; tile < jobs.size(); ++tile) {
     jobs[tile].tile = static_cast<int32_t>(tile);
     jobs[tile].num_tiles = static_cast<int32_t>(jobs.size());
   }
   return jobs;
+}
+
+int64_t WorkOf(const TileJob& job) {
+  auto num_pixels = static_cast<int64_t>(job.left.pixels.size() + job.right.pixels.size() + job.depth.pixels.size());
+  int64_t work = 0;
+  for (int32_t level = job.first_level; level <= job.last_level; ++level) {
+    work += num_pixels;
+    num_pixels = num_pixels * 25 / 36;  // each level is 5/6 of the one below in both directions
+  }
+  return std::max<int64_t>(work, 1);
 }
 
 Result<> CheckTileJob(const TileJob& job) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
+#include "features/tiling.h"
 #include "messages/topics.h"
 
 namespace tessera {

@@ -115,21 +115,5 @@ TEST(FairQueue, SharesAreEvenWheneverTwoHaveWork) {
   }
 }
 
-TEST(FairQueue, WorkGrowsWithPixelsAndLevels) {
-  TileJob whole;
-  whole.last_level = 7;
-  whole.left.pixels.resize(36000);
-  TileJob stereo = whole;
-  stereo.right = whole.left;
-  EXPECT_NEAR(static_cast<double>(WorkOf(stereo)), 2.0 * static_cast<double>(WorkOf(whole)), 100.0);
-  TileJob fine = whole;
-  fine.last_level = 3;
-  TileJob coarse = whole;
-  coarse.first_level = 4;
-  EXPECT_EQ(WorkOf(fine) + WorkOf(coarse) - WorkOf(whole), 36000 + 25000 + 17361 + 12056)
-      << "cut by levels, only the reduction of the fine ones is done twice";
-  EXPECT_GE(WorkOf(TileJob{}), 1);
-}
-
 }  // namespace
 }  // namespace tessera

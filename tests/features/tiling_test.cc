@@ -8,6 +8,7 @@
 
 #include "core/errors.h"
 #include "features/extractor.h"
+#include "features/pyramid.h"
 #include "features/selection.h"
 #include "features/tile_plan.h"
 #include "support/feature_images.h"
@@ -58,6 +59,41 @@ TEST(CutFrame, RefusesImagesOfAnotherSize) {
   EXPECT_THROW(CutFrame(frame, calibration, 0, {}, 4, {.num_levels = 0}), InputError);
   frame.right = {};
   EXPECT_THROW(CutFrame(frame, calibration, 0, {}, 4, {}), InputError);
+}
+
+TEST(CutFrame, BringsCoarseLevelsReducedAndTheMostWorkFirst) {
+  const CameraCalibration calibration = MakeCalibration(SensorType::kMono, 1241, 376);
+  const CameraFrame frame = MakeFrame(SensorType::kMono, MakeTexture(1241, 376, 1));
+  const std::vector<TileJob> jobs = CutFrame(frame, calibration, 0, {2, 8}, 4, {});
+  ASSERT_EQ(jobs.size(), 17U);
+  int num_coarse = 0;
+  for (size_t i = 0; i < jobs.size(); ++i) {
+    EXPECT_EQ(jobs[i].tile, static_cast<int>(i));
+    EXPECT_LE(WorkOf(jobs[i]), WorkOf(jobs[i > 0 ? i - 1 : 0])) << "tile " << i;
+    if (jobs[i].first_level == 0) continue;
+    ++num_coarse;
+    EXPECT_EQ(jobs[i].first_level, 4);
+    EXPECT_LE(jobs[i].left_rect.right(), LevelSize(1241, 4));
+    EXPECT_LE(4 * jobs[i].left.pixels.size(), frame.left.pixels.size());
+  }
+  EXPECT_EQ(num_coarse, 1);
+}
+
+TEST(WorkOf, GrowsWithPixelsAndLevels) {
+  TileJob whole;
+  whole.last_level = 7;
+  whole.left.pixels.resize(36000);
+  TileJob stereo = whole;
+  stereo.right = whole.left;
+  EXPECT_NEAR(static_cast<double>(WorkOf(stereo)), 2.0 * static_cast<double>(WorkOf(whole)), 100.0);
+  TileJob fine = whole;
+  fine.last_level = 3;
+  EXPECT_EQ(WorkOf(fine), 36000 + 25000 + 17361 + 12056);
+  TileJob coarse = whole;
+  coarse.first_level = 4;
+  coarse.left.pixels.resize(12056 * 25 / 36);
+  EXPECT_EQ(WorkOf(fine) + WorkOf(coarse), WorkOf(whole));
+  EXPECT_GE(WorkOf(TileJob{}), 1);
 }
 
 TEST(LevelQuotas, AddUpAndFallByFiveSixths) {
