@@ -25,9 +25,10 @@ run_tests() {
   tell_failures
 }
 
+# Two at a time: they wait for processes most of the time. helpers/stack.py gives each its ports.
 run_pytest() (
   cd "$root"
-  PYTHONPATH="$root/procman" .venv/bin/python -P -m pytest -p no:cacheprovider -rs tests
+  PYTHONPATH="$root/procman" .venv/bin/python -P -m pytest -p no:cacheprovider -n 2 --dist loadfile -rs tests
 )
 
 NOT_SANITIZED='^(simulation|stages)$'

@@ -1,17 +1,16 @@
 """Nodes: deputies as a user starts them, and whoever gives them orders."""
 
 import json
-import os
 import subprocess
 from pathlib import Path
 from typing import Any, Protocol
 
-from helpers.stack import ROOT, RUN_TIMEOUT_S, environment, read_line
+from helpers.stack import ROOT, RUN_TIMEOUT_S, SUITE, environment, read_line
 from tessera_cli.files import python_command
 
 PORTS_PER_NODE = 25
 # Two test suites on one machine use different ports.
-FIRST_NODE_PORT = 61000 + (os.getpid() % 7) * 20 * PORTS_PER_NODE
+FIRST_NODE_PORT = 61000 + (SUITE % 7) * 20 * PORTS_PER_NODE
 
 
 class Node:

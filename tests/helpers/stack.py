@@ -16,8 +16,17 @@ ROOT = Path(__file__).resolve().parents[2]
 RUN_TIMEOUT_S = 120.0
 NUM_FRAMES = 60
 PORTS_PER_RUN = 40
+
+
+def _suite() -> int:
+    """Another number for each test suite on this machine, and for both of its workers (pytest-xdist)."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    return 2 * os.getppid() + int(worker.removeprefix("gw")) if worker else 2 * os.getpid()
+
+
 # Two test suites on one machine use different ports.
-FIRST_PORT = 20000 + (os.getpid() % 50) * 800
+SUITE = _suite()
+FIRST_PORT = 20000 + (SUITE % 50) * 800
 
 
 def environment() -> dict[str, str]:
