@@ -32,7 +32,7 @@ FeatureFrame ExtractView(const GrayImage& image, const CameraCalibration& calibr
   for (const TileJob& job : CutFrame(frame, calibration, 0, TileGrid{1, 1}, kMaxLevels, options)) {
     tiles.push_back(extractor.Extract(job));
   }
-  return SelectFeatures(tiles);
+  return SelectFeatures(tiles).value().features;
 }
 
 // Descriptors by image, of the images that have any.

@@ -144,7 +144,12 @@ void DispatcherSession::Receive(const TileAck& ack, int64_t reassembler_epoch_us
   if (reassembler_epoch_us_ && *reassembler_epoch_us_ != reassembler_epoch_us) queue_.GiveAllAgain();
   reassembler_epoch_us_ = reassembler_epoch_us;
   queue_.SetRun(reassembler_epoch_us);
-  queue_.Acknowledge(ack.frame, ack.tiles);
+  if (ack.wants_all) {
+    queue_.WantAll(ack.frame, ack.tiles);
+  } else {
+    queue_.Acknowledge(ack.frame, ack.tiles);
+  }
+  if (!ack.lowest_priority.empty()) queue_.SetLowestPriority(ack.lowest_priority);
 }
 
 Result<> DispatcherSession::MarkTracked(FrameId frame) {

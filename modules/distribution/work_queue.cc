@@ -5,6 +5,13 @@
 #include <utility>
 
 namespace tessera {
+namespace {
+
+// Quarters of the lowest priority that was chosen of a frame, below which candidates are not asked of later ones: low
+// enough that hardly a frame needs more of them (README.md of features).
+constexpr int kGuess = 3;
+
+}  // namespace
 
 Result<> WorkQueueOptions::Check() const {
   if (max_queued_frames < 1) return Failed("at least one frame must fit the queue");
@@ -60,6 +67,27 @@ void WorkQueue::Acknowledge(FrameId frame, const std::vector<int32_t>& tiles) {
     std::erase(to_give_, key);
     FreeWorkersOf(key);
   }
+}
+
+void WorkQueue::WantAll(FrameId frame, const std::vector<int32_t>& tiles) {
+  for (const int32_t tile : tiles) {
+    const JobKey key{frame, tile};
+    const auto found = jobs_.find(key);
+    if (found == jobs_.end()) continue;
+    Job& job = found->second;
+    if (job.job.min_priority.empty()) continue;  // they are on their way
+    job.job.min_priority.clear();
+    FreeWorkersOf(key);
+    std::erase(to_give_, key);
+    to_give_.push_front(key);
+    if (std::exchange(job.is_acknowledged, false)) ++num_open_;
+    ++num_wanted_whole_;
+  }
+}
+
+void WorkQueue::SetLowestPriority(const std::vector<int32_t>& lowest_priority) {
+  min_priority_ = lowest_priority;
+  for (int32_t& priority : min_priority_) priority = priority / 4 * kGuess;
 }
 
 void WorkQueue::FreeWorkersOf(const JobKey& key) {
@@ -134,8 +162,10 @@ void WorkQueue::CheckExtractors(int64_t now_us) {
 void WorkQueue::CutNextFrame() {
   Waiting next = std::move(waiting_.front());
   waiting_.pop_front();
-  for (TileJob& job : CutFrame(next.frame, next.calibration, next.captured_us, options_.grid,
-                               options_.coarse_levels_from, options_.features)) {
+  std::vector<TileJob> jobs = CutFrame(next.frame, next.calibration, next.captured_us, options_.grid,
+                                       options_.coarse_levels_from, options_.features);
+  for (TileJob& job : jobs) {
+    if (jobs.size() > 1) job.min_priority = min_priority_;
     job.previous_frame = next.previous_frame;
     const JobKey key{job.frame, job.tile};
     jobs_[key].job = std::move(job);

@@ -52,6 +52,11 @@ class WorkQueue {
   void HearExtractor(int extractor, int64_t epoch_us, int64_t now_us, int32_t num_robots = 1);
   // The reassembler has these tiles.
   void Acknowledge(FrameId frame, const std::vector<int32_t>& tiles);
+  // The reassembler does not have these tiles: it needs all their candidates. They are given again.
+  void WantAll(FrameId frame, const std::vector<int32_t>& tiles);
+  // What was chosen of a frame (features/selection.h): candidates far below that are not asked of those that are cut
+  // from now on.
+  void SetLowestPriority(const std::vector<int32_t>& lowest_priority);
   // The reassembler lost all that it has acknowledged.
   void GiveAllAgain();
   // The tracker has finished this frame and all before it.
@@ -74,6 +79,7 @@ class WorkQueue {
   int num_extractors() const { return static_cast<int>(extractors_.size()); }
   int num_in_flight() const { return static_cast<int>(untracked_.size()); }
   int64_t num_given_again() const { return num_given_again_; }
+  int64_t num_wanted_whole() const { return num_wanted_whole_; }
   // The last frame that was not dropped; invalid if there was none.
   FrameId last_frame() const { return last_frame_; }
 
@@ -118,6 +124,8 @@ class WorkQueue {
   int64_t run_ = 0;
   int64_t turn_ = 0;  // counts ended jobs
   int64_t num_given_again_ = 0;
+  int64_t num_wanted_whole_ = 0;
+  std::vector<int32_t> min_priority_;  // of jobs of frames that are cut
 };
 
 }  // namespace tessera

@@ -42,6 +42,7 @@ TileFeatures Extractor::Extract(const TileJob& job) {
                         .num_tiles = job.num_tiles,
                         .calibration = job.calibration,
                         .options = job.options,
+                        .cuts = cuts_,
                         .candidates = {},
                         .descriptors = {}};
   DescribeCandidates(features);
@@ -69,6 +70,7 @@ void Extractor::BuildPyramids(const TileJob& job) {
 
 void Extractor::DetectCandidates(const TileJob& job) {
   candidates_.clear();
+  cuts_.clear();
   for (int level = job.first_level; level <= job.last_level; ++level) {
     const auto l = static_cast<size_t>(level);
     const LevelPlan& plan = plan_.levels[l];
@@ -77,7 +79,10 @@ void Extractor::DetectCandidates(const TileJob& job) {
     smoother_.Smooth(left_[l], Grow(plan.corners, kPatchRadiusPx + 2), 1, smoothed_[l]);
     detector_.Detect(smoothed_[l], plan, level, job.options.min_score, capacity, candidates_);
   }
-  if (!IsWholeImage(job)) return;
+  if (!IsWholeImage(job)) {
+    if (!job.min_priority.empty()) cuts_ = LeaveOutBelow(job.min_priority, job.calibration, candidates_);
+    return;
+  }
   // Nothing of the image is missing, so those that will not be selected need no descriptor.
   std::vector<Candidate> chosen;
   for (const uint32_t index : ChooseCandidates(job.calibration, job.options, candidates_)) {

@@ -19,7 +19,8 @@ namespace tessera {
 class Extractor {
  public:
   // The candidates of the job's tile, a pure function of the job: whatever the cut, the candidates of all tiles
-  // together are those of the whole image, up to such as SelectFeatures would not take anyway. Throws
+  // together are those of the whole image, up to such as SelectFeatures would not take anyway and such as the job does
+  // not want. Throws
   // std::invalid_argument with CheckTileJob's sentence if the job is malformed.
   TileFeatures Extract(const TileJob& job);
 
@@ -39,6 +40,7 @@ class Extractor {
   Smoother smoother_;
   StereoMatcher matcher_;
   std::vector<Candidate> candidates_;
+  std::vector<LevelCut> cuts_;
 };
 
 }  // namespace tessera

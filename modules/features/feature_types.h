@@ -96,6 +96,9 @@ struct TileJob {
   GrayImage right;   // stereo: right_rect of the right image
   Rect depth_rect;   // RGB-D: level-0 pixels in `depth`
   DepthImage depth;  // RGB-D: depth_rect of the depth image
+  // By level: candidates of a lower priority (selection.h) need not be sent; empty: all are wanted. Guessed from frames
+  // before, for less to compute and to send; it never changes which features come out.
+  std::vector<int32_t> min_priority;
   GrayImage packed;  // a row of bytes on the way to another machine (tile_packing.h): the images come in it alone
 
   bool operator==(const TileJob&) const = default;
@@ -118,6 +121,14 @@ struct Candidate {
   bool operator==(const Candidate&) const = default;
 };
 
+// Of the candidates of one level, those below min_priority were not sent.
+struct LevelCut {
+  int32_t min_priority = 0;
+  int32_t num_found = 0;  // with those that were not sent
+
+  bool operator==(const LevelCut&) const = default;
+};
+
 // The answer to a TileJob: candidates[i] belongs to descriptors[i].
 struct TileFeatures {
   int64_t run = 0;  // as in TileJob
@@ -129,6 +140,7 @@ struct TileFeatures {
   int32_t num_tiles = 1;
   CameraCalibration calibration;
   FeatureOptions options;
+  std::vector<LevelCut> cuts;  // by level; empty: all candidates are here
   std::vector<Candidate> candidates;
   std::vector<Descriptor> descriptors;
 

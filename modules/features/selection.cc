@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <map>
 #include <tuple>
+#include <utility>
 
 #include "features/pyramid.h"
 #include "features/tile_plan.h"
@@ -88,13 +90,95 @@ std::array<size_t, kMaxLevels> ShareOut(const FeatureOptions& options,
   return taken;
 }
 
-// The entries of one level, moved so that the `count` best come first.
-void PutBestFirst(std::span<Entry> level, size_t count) {
-  if (count >= level.size()) return;
-  WeighByRank(level);
-  std::nth_element(
-      level.begin(), level.begin() + static_cast<ptrdiff_t>(count), level.end(),
-      [](const Entry& a, const Entry& b) { return std::tie(b.priority, a.y, a.x) < std::tie(a.priority, b.y, b.x); });
+// The weighed entries of one level, moved so that the `count` best come first; count > 0. Returns the lowest priority
+// among these.
+uint32_t PutBestFirst(std::span<Entry> level, size_t count) {
+  const auto last = level.begin() + static_cast<ptrdiff_t>(count) - 1;
+  std::nth_element(level.begin(), last, level.end(), [](const Entry& a, const Entry& b) {
+    return std::tie(b.priority, a.y, a.x) < std::tie(a.priority, b.y, b.x);
+  });
+  return last->priority;
+}
+
+// The entries of each level, one level after the other in `entries`.
+std::array<std::span<Entry>, kMaxLevels> ByLevel(std::vector<Entry>& entries) {
+  std::array<size_t, kMaxLevels> sizes{};
+  for (const Entry& entry : entries) ++sizes[entry.level];
+  std::array<std::span<Entry>, kMaxLevels> levels;
+  size_t first = 0;
+  for (size_t level = 0; level < levels.size(); first += sizes[level], ++level) {
+    levels[level] = std::span(entries).subspan(first, sizes[level]);
+  }
+  return levels;
+}
+
+// What is known of the candidates that were found, sent or not.
+struct Found {
+  std::array<size_t, kMaxLevels> num{};             // of each level, at least as many as are here; all that lack ...
+  std::array<uint32_t, kMaxLevels> min_priority{};  // ... have a lower priority than this
+};
+
+struct Choice {
+  std::vector<uint32_t> indices;         // as ChooseCandidates has them
+  std::vector<int32_t> lowest_priority;  // that was chosen, by level; 0: all that were found
+  bool is_certain = true;                // it is that from all candidates
+};
+
+Choice Choose(const CameraCalibration& calibration, const FeatureOptions& options,
+              std::span<const Candidate> candidates, Found found) {
+  std::vector<Entry> entries = SortedEntries(calibration, candidates);
+  const std::array<std::span<Entry>, kMaxLevels> levels = ByLevel(entries);
+  for (size_t l = 0; l < levels.size(); ++l) found.num[l] = std::max(found.num[l], levels[l].size());
+  const std::array<size_t, kMaxLevels> taken = ShareOut(options, found.num);
+  Choice choice;
+  std::vector<Entry> chosen;
+  chosen.reserve(static_cast<size_t>(options.num_features));
+  for (size_t l = 0; l < static_cast<size_t>(options.num_levels); ++l) {
+    const std::span<Entry> level = levels[l];
+    const size_t num = std::min(taken[l], level.size());
+    uint32_t lowest = 0;
+    if (num > 0 && num < found.num[l]) {
+      WeighByRank(level);
+      lowest = PutBestFirst(level, num);
+    }
+    const bool all_are_here = level.size() == found.num[l];
+    if (!all_are_here && (num < taken[l] || lowest < found.min_priority[l])) choice.is_certain = false;
+    choice.lowest_priority.push_back(static_cast<int32_t>(lowest));
+    chosen.insert(chosen.end(), level.begin(), level.begin() + static_cast<ptrdiff_t>(num));
+  }
+  std::sort(chosen.begin(), chosen.end(), IsBefore);
+  choice.indices.reserve(chosen.size());
+  for (const Entry& entry : chosen) choice.indices.push_back(entry.index);
+  return choice;
+}
+
+// The answers to all jobs of a frame, each once, in the order of tiles.
+struct Answers {
+  std::vector<Candidate> candidates;
+  std::vector<const Descriptor*> descriptors;
+  Found found;
+};
+
+Answers Join(const std::vector<TileFeatures>& tiles) {
+  std::map<int32_t, const TileFeatures*> ordered;
+  for (const TileFeatures& tile : tiles) ordered.emplace(tile.tile, &tile);
+  Answers all;
+  bool is_cut = false;
+  for (const auto& [number, tile] : ordered) {
+    is_cut = is_cut || !tile->cuts.empty();
+    all.candidates.insert(all.candidates.end(), tile->candidates.begin(), tile->candidates.end());
+    for (const Descriptor& descriptor : tile->descriptors) all.descriptors.push_back(&descriptor);
+    if (tile->cuts.empty()) {
+      for (const Candidate& candidate : tile->candidates) ++all.found.num[candidate.level];
+    }
+    for (size_t level = 0; level < tile->cuts.size(); ++level) {
+      uint32_t& min_priority = all.found.min_priority[level];
+      all.found.num[level] += static_cast<size_t>(tile->cuts[level].num_found);
+      min_priority = std::max(min_priority, static_cast<uint32_t>(tile->cuts[level].min_priority));
+    }
+  }
+  if (!is_cut) all.found = {};
+  return all;
 }
 
 Keypoint MakeKeypoint(const Candidate& candidate) {
@@ -114,49 +198,48 @@ Keypoint MakeKeypoint(const Candidate& candidate) {
 
 std::vector<uint32_t> ChooseCandidates(const CameraCalibration& calibration, const FeatureOptions& options,
                                        std::span<const Candidate> candidates) {
-  std::vector<Entry> entries = SortedEntries(calibration, candidates);
-  std::array<size_t, kMaxLevels> available{};
-  for (const Entry& entry : entries) ++available[entry.level];
-  const std::array<size_t, kMaxLevels> taken = ShareOut(options, available);
-
-  std::vector<Entry> chosen;
-  chosen.reserve(static_cast<size_t>(options.num_features));
-  size_t first = 0;
-  for (size_t level = 0; level < taken.size(); first += available[level], ++level) {
-    const std::span<Entry> entries_of_level(entries.data() + first, available[level]);
-    PutBestFirst(entries_of_level, taken[level]);
-    chosen.insert(chosen.end(), entries_of_level.begin(),
-                  entries_of_level.begin() + static_cast<ptrdiff_t>(taken[level]));
-  }
-  std::sort(chosen.begin(), chosen.end(), IsBefore);
-  std::vector<uint32_t> indices;
-  indices.reserve(chosen.size());
-  for (const Entry& entry : chosen) indices.push_back(entry.index);
-  return indices;
+  return Choose(calibration, options, candidates, {}).indices;
 }
 
-FeatureFrame SelectFeatures(const std::vector<TileFeatures>& tiles) {
-  std::vector<const TileFeatures*> ordered;
-  for (const TileFeatures& tile : tiles) ordered.push_back(&tile);
-  std::sort(ordered.begin(), ordered.end(), [](const auto* a, const auto* b) { return a->tile < b->tile; });
-  std::vector<Candidate> candidates;
-  std::vector<const Descriptor*> descriptors;
-  for (const TileFeatures* tile : ordered) {
-    candidates.insert(candidates.end(), tile->candidates.begin(), tile->candidates.end());
-    for (const Descriptor& descriptor : tile->descriptors) descriptors.push_back(&descriptor);
+std::vector<LevelCut> LeaveOutBelow(const std::vector<int32_t>& min_priority, const CameraCalibration& calibration,
+                                    std::vector<Candidate>& candidates) {
+  std::vector<LevelCut> cuts;
+  for (const int32_t priority : min_priority) cuts.push_back({.min_priority = priority});
+  std::vector<Entry> entries = SortedEntries(calibration, candidates);
+  std::vector<uint32_t> kept;
+  for (const std::span<Entry> level : ByLevel(entries)) {
+    WeighByRank(level);
+    for (const Entry& entry : level) {
+      LevelCut& cut = cuts.at(entry.level);
+      ++cut.num_found;
+      if (std::cmp_greater_equal(entry.priority, cut.min_priority)) kept.push_back(entry.index);
+    }
   }
-  const TileFeatures& first = *ordered.front();
-  FeatureFrame frame{.frame = first.frame,
-                     .utime_us = first.utime_us,
-                     .captured_us = first.captured_us,
-                     .calibration = first.calibration,
-                     .keypoints = {},
-                     .descriptors = {}};
-  for (const uint32_t index : ChooseCandidates(first.calibration, first.options, candidates)) {
-    frame.keypoints.push_back(MakeKeypoint(candidates[index]));
-    frame.descriptors.push_back(*descriptors[index]);
+  std::sort(kept.begin(), kept.end());
+  std::vector<Candidate> those;
+  those.reserve(kept.size());
+  for (const uint32_t index : kept) those.push_back(candidates[index]);
+  candidates.swap(those);
+  return cuts;
+}
+
+std::optional<Selection> SelectFeatures(const std::vector<TileFeatures>& tiles) {
+  const TileFeatures& first = tiles.front();
+  const Answers all = Join(tiles);
+  Choice choice = Choose(first.calibration, first.options, all.candidates, all.found);
+  if (!choice.is_certain) return std::nullopt;
+  Selection selection{.features = {.frame = first.frame,
+                                   .utime_us = first.utime_us,
+                                   .captured_us = first.captured_us,
+                                   .calibration = first.calibration,
+                                   .keypoints = {},
+                                   .descriptors = {}},
+                      .lowest_priority = std::move(choice.lowest_priority)};
+  for (const uint32_t index : choice.indices) {
+    selection.features.keypoints.push_back(MakeKeypoint(all.candidates[index]));
+    selection.features.descriptors.push_back(*all.descriptors[index]);
   }
-  return frame;
+  return selection;
 }
 
 Result<> CheckTileFeatures(const TileFeatures& features) {
@@ -172,6 +255,14 @@ Result<> CheckTileFeatures(const TileFeatures& features) {
   if (features.descriptors.size() != features.candidates.size()) {
     return Failed(name + std::to_string(features.candidates.size()) + " candidates have " +
                   std::to_string(features.descriptors.size()) + " descriptors");
+  }
+  const auto num_levels = static_cast<size_t>(features.options.num_levels);
+  if (!features.cuts.empty() && features.cuts.size() != num_levels) {
+    return Failed(name + "candidates are left out of " + std::to_string(features.cuts.size()) + " levels of " +
+                  std::to_string(num_levels));
+  }
+  for (const LevelCut& cut : features.cuts) {
+    if (cut.min_priority < 0 || cut.num_found < 0) return Failed(name + "it left out candidates below zero");
   }
   for (const Candidate& candidate : features.candidates) {
     if (candidate.level >= features.options.num_levels) {

@@ -54,6 +54,10 @@ Result<> CheckNumbers(const TileJob& job) {
     return Failed("levels " + std::to_string(job.first_level) + " to " + std::to_string(job.last_level) +
                   " are not a range of the pyramid's " + std::to_string(job.options.num_levels));
   }
+  if (!job.min_priority.empty() && job.min_priority.size() != static_cast<size_t>(job.options.num_levels)) {
+    return Failed("it names the lowest priorities of " + std::to_string(job.min_priority.size()) +
+                  " levels, which is not the pyramid's number");
+  }
   if (!LiesWithin(job.core, job.calibration, 0)) return Failed("the core leaves the image");
   return {};
 }

@@ -23,6 +23,9 @@ struct ExtractorReady {
 struct TileAck {
   FrameId frame;
   std::vector<int32_t> tiles;
+  bool wants_all = false;  // they are not there: what was left out of them may be needed, too
+  // Of a frame that was cut and is released: the lowest priority that was chosen, by level (features/selection.h).
+  std::vector<int32_t> lowest_priority;
 };
 
 enum class StageState { kStarting = 0, kRunning = 1, kFinished = 2, kFailed = 3 };

@@ -64,6 +64,8 @@ struct Layout<tile_job_t> {
     fields.Check(is_inside(job.core) && is_inside(job.left_rect) && is_inside_or_empty(job.right_rect) &&
                      is_inside_or_empty(job.depth_rect),
                  "a rectangle leaves the image");
+    fields.List(message.num_levels, message.min_priority, job.min_priority);
+    fields.Check(job.min_priority.size() <= kMaxLevels, "it names more levels than a pyramid has");
     fields(message.num_packed, job.packed.width);
     fields.Check(job.packed.width >= 0 && job.packed.width <= kMaxPackedBytes, "its packed images are too large");
     const bool is_packed = job.packed.width > 0;
@@ -83,6 +85,10 @@ struct Layout<tile_features_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& tile) {
     DescribeTile(fields, message, tile);
+    fields.Table(
+        message.num_levels, [&](size_t i) { return i < kMaxLevels && tile.cuts[i].num_found >= 0; },
+        Column(message.min_priority, tile.cuts, &LevelCut::min_priority),
+        Column(message.num_found, tile.cuts, &LevelCut::num_found));
     auto& candidates = tile.candidates;
     fields.WholeTable(
         message.num_total, message.first, message.num_candidates,
@@ -107,6 +113,9 @@ struct Layout<tile_ack_t> {
     fields.Table(
         message.num_tiles, [&](size_t i) { return ack.tiles[i] >= 0 && ack.tiles[i] < kMaxTiles; },
         Column(message.tiles, ack.tiles));
+    fields(message.wants_all, ack.wants_all);
+    fields.List(message.num_levels, message.lowest_priority, ack.lowest_priority);
+    fields.Check(ack.lowest_priority.size() <= kMaxLevels, "it names more levels than a pyramid has");
   }
 };
 TESSERA_CODEC(TileAck, tile_ack_t);

@@ -84,7 +84,7 @@ void Extraction(benchmark::State& state, SensorType sensor, TileGrid grid, int c
       tiles.push_back(extractor.Extract(job));
       num_candidates += tiles.back().candidates.size();
     }
-    frame = SelectFeatures(tiles);
+    frame = SelectFeatures(tiles).value().features;
     benchmark::DoNotOptimize(frame.keypoints.data());
   }
   size_t bytes = 0;

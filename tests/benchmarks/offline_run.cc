@@ -33,7 +33,7 @@ FeatureFrame ExtractFrame(const CameraFrame& frame, const CameraCalibration& cal
   }
   *num_corners = 0;
   for (const TileFeatures& tile : tiles) *num_corners += static_cast<int64_t>(tile.candidates.size());
-  return SelectFeatures(tiles);
+  return SelectFeatures(tiles).value().features;
 }
 
 void MirrorImage(GrayImage& image) {

@@ -96,7 +96,7 @@ std::vector<View> CollectViews(const Arguments& arguments) {
     for (const TileJob& job : CutFrame(*frame, source->calibration(), 0, TileGrid{1, 1}, kMaxLevels, options)) {
       tiles.push_back(extractor.Extract(job));
     }
-    views.push_back({frame->id, pose->second, way_m, SelectFeatures(tiles).descriptors});
+    views.push_back({frame->id, pose->second, way_m, SelectFeatures(tiles).value().features.descriptors});
   }
   return views;
 }

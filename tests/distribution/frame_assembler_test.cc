@@ -36,7 +36,7 @@ TEST(FrameAssembler, ReleasesFramesInOrderWhateverTheOrderOfTiles) {
   for (const int64_t id : {0, 1, 3, 4, 7}) {  // 2, 5 and 6 were dropped
     const std::vector<TileFeatures> tiles = TilesOf(id, previous);
     all.insert(all.end(), tiles.begin(), tiles.end());
-    expected.push_back(SelectFeatures(tiles));
+    expected.push_back(SelectFeatures(tiles).value().features);
     previous = id;
   }
   ASSERT_GT(expected[0].keypoints.size(), 100U);
@@ -49,7 +49,7 @@ TEST(FrameAssembler, ReleasesFramesInOrderWhateverTheOrderOfTiles) {
     std::vector<FeatureFrame> released;
     for (const TileFeatures& tile : arriving) {
       EXPECT_NE(assembler.Add(tile), FrameAssembler::Result::kRefused);
-      while (assembler.CanRelease()) released.push_back(assembler.ReleaseNext());
+      while (assembler.CanRelease()) released.push_back(assembler.ReleaseNext().value().features);
     }
     ASSERT_EQ(released.size(), expected.size());
     for (size_t i = 0; i < released.size(); ++i) {
@@ -68,13 +68,59 @@ TEST(FrameAssembler, OneThatIsStartedAgainGoesOnBehindWhatIsTracked) {
   EXPECT_FALSE(assembler.CanRelease()) << "frame 7 may still lack";
   assembler.SkipTo({7});
   ASSERT_TRUE(assembler.CanRelease());
-  EXPECT_EQ(assembler.ReleaseNext().frame.value, 8);
+  EXPECT_EQ(assembler.ReleaseNext().value().features.frame.value, 8);
   assembler.SkipTo({8});
   EXPECT_EQ(assembler.num_open_frames(), 1);
   assembler.SkipTo({9});
   EXPECT_EQ(assembler.num_open_frames(), 0);
   EXPECT_EQ(assembler.Add(TilesOf(9, 8).front()), FrameAssembler::Result::kRepeated);
   EXPECT_EQ(assembler.last_released().value, 9);
+}
+
+// Candidates of the frame's tiles with at least these priorities.
+std::vector<TileFeatures> CutTilesOf(int64_t frame_id, const std::vector<int32_t>& min_priority) {
+  std::vector<TileFeatures> tiles = TilesOf(frame_id, frame_id - 1);
+  for (TileFeatures& tile : tiles) {
+    const std::vector<Candidate> all = tile.candidates;
+    tile.cuts = LeaveOutBelow(min_priority, tile.calibration, tile.candidates);
+    std::vector<Descriptor> descriptors;
+    for (const Candidate& candidate : tile.candidates) {
+      descriptors.push_back(tile.descriptors[static_cast<size_t>(std::ranges::find(all, candidate) - all.begin())]);
+    }
+    tile.descriptors = descriptors;
+  }
+  return tiles;
+}
+
+TEST(FrameAssembler, AwaitsAllCandidatesWhereTooManyWereLeftOut) {
+  const std::vector<TileFeatures> whole = TilesOf(0, -1);
+  const Selection expected = SelectFeatures(whole).value();
+  const std::vector<TileFeatures> few = CutTilesOf(0, std::vector<int32_t>(kNumLevels, 1 << 28));
+  FrameAssembler assembler(64);
+  EXPECT_EQ(assembler.Add(whole[1]), FrameAssembler::Result::kKept);
+  for (size_t i = 0; i < few.size(); ++i) {
+    const auto expected_result = i == 1 ? FrameAssembler::Result::kRepeated : FrameAssembler::Result::kKept;
+    EXPECT_EQ(assembler.Add(few[i]), expected_result);
+  }
+  ASSERT_TRUE(assembler.CanRelease());
+  EXPECT_FALSE(assembler.ReleaseNext());
+  const std::vector<TileAck> forgotten = assembler.TakeForgotten();
+  ASSERT_EQ(forgotten.size(), 1U);
+  EXPECT_TRUE(forgotten[0].wants_all);
+  EXPECT_EQ(forgotten[0].tiles.size(), few.size() - 1) << "all but tile 1, which brought all it had";
+  EXPECT_EQ(assembler.Add(few[0]), FrameAssembler::Result::kTooFew) << "comes late";
+  EXPECT_EQ(assembler.Add(few[1]), FrameAssembler::Result::kRepeated);
+  for (const TileFeatures& tile : TilesOf(1, 0)) assembler.Add(tile);
+  EXPECT_FALSE(assembler.CanRelease()) << "frame 0 comes first";
+  for (const int32_t tile : forgotten[0].tiles) {
+    EXPECT_EQ(assembler.Add(whole[static_cast<size_t>(tile)]), FrameAssembler::Result::kKept);
+  }
+  ASSERT_TRUE(assembler.CanRelease());
+  const Selection selection = assembler.ReleaseNext().value();
+  EXPECT_EQ(selection.features.keypoints, expected.features.keypoints);
+  EXPECT_EQ(selection.features.descriptors, expected.features.descriptors);
+  EXPECT_EQ(selection.lowest_priority, expected.lowest_priority);
+  EXPECT_TRUE(assembler.CanRelease()) << "frame 1";
 }
 
 TEST(FrameAssembler, RefusesContradictionsAndFloods) {

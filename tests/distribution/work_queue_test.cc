@@ -85,6 +85,40 @@ TEST(WorkQueue, GivesTheJobsOfADeadExtractorToAnother) {
   }
 }
 
+TEST(WorkQueue, AsksForNoCandidatesFarBelowThoseChosenBeforeUnlessTheyAreWanted) {
+  WorkQueue queue(TwoByTwo());
+  queue.HearExtractor(0, 1, 0);
+  queue.AddFrame(Frame(0), kCalibration, 0);
+  EXPECT_TRUE(queue.GiveNext(0).job->min_priority.empty()) << "nothing is known yet";
+  queue.SetLowestPriority({400, 40, 4, 0, 0, 0, 0, 0});
+  queue.MarkTracked({0});
+  queue.AddFrame(Frame(1), kCalibration, 0);
+  const int32_t tile = queue.GiveNext(0).job->tile;
+  const int32_t other = queue.GiveNext(0).job->tile;
+  queue.Acknowledge({1}, {tile});
+  queue.WantAll({1}, {tile});
+  EXPECT_EQ(queue.num_wanted_whole(), 1);
+  const WorkQueue::Assignment again = queue.GiveNext(0);
+  EXPECT_EQ(again.job->tile, tile) << "before all that waits";
+  EXPECT_TRUE(again.job->min_priority.empty());
+  queue.WantAll({1}, {tile});
+  EXPECT_EQ(queue.num_wanted_whole(), 1) << "they are on their way";
+  queue.Acknowledge({1}, {tile, other});
+  const std::vector<int32_t> guess = queue.GiveNext(0).job->min_priority;
+  ASSERT_EQ(guess.size(), 8U);
+  EXPECT_GT(guess[0], 100);
+  EXPECT_LT(guess[0], 400);
+  EXPECT_EQ(guess[7], 0);
+}
+
+TEST(WorkQueue, WholeImagesAreAskedForAll) {
+  WorkQueue queue({});
+  queue.HearExtractor(0, 1, 0);
+  queue.SetLowestPriority({400, 40, 4, 0, 0, 0, 0, 0});
+  queue.AddFrame(Frame(0), kCalibration, 0);
+  EXPECT_TRUE(queue.GiveNext(0).job->min_priority.empty()) << "the extractor chooses itself";
+}
+
 TEST(WorkQueue, ARestartedExtractorGetsItsJobsAgain) {
   WorkQueue queue(TwoByTwo());
   queue.AddFrame(Frame(0), kCalibration, 0);

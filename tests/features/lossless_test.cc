@@ -37,7 +37,7 @@ FeatureFrame ExtractCut(const CameraFrame& frame, TileGrid grid, int coarse_leve
     EXPECT_THAT(CheckTileFeatures(tiles.back()), IsSuccess());
   }
   std::shuffle(tiles.begin(), tiles.end(), random);
-  return SelectFeatures(tiles);
+  return SelectFeatures(tiles).value().features;
 }
 
 void ExpectLossless(const GrayImage& image, SensorType sensor, TileGrid grid, int coarse_levels_from,
@@ -160,10 +160,70 @@ TEST(Lossless, RepeatedCandidatesCountOnce) {
   for (const TileJob& job : CutFrame(MakeFrame(SensorType::kMono, image), calibration, 99, {2, 2}, 3, options)) {
     tiles.push_back(extractor.Extract(job));
   }
-  const FeatureFrame expected = SelectFeatures(tiles);
+  const FeatureFrame expected = SelectFeatures(tiles).value().features;
   tiles.push_back(tiles[1]);
   tiles.push_back(tiles[0]);
-  ExpectSame(SelectFeatures(tiles), expected, "with repeated tiles");
+  ExpectSame(SelectFeatures(tiles).value().features, expected, "with repeated tiles");
+}
+
+// What is left out below any guess either shows as missing, or changes nothing.
+TEST(Lossless, CandidatesBelowAGuessAreLeftOutOrMissed) {
+  const CameraFrame frame = MakeFrame(SensorType::kStereo, MakeTexture(500, 300, 12));
+  const CameraCalibration calibration = MakeCalibration(SensorType::kStereo, 500, 300);
+  for (const int num_features : {300, 900, 5000}) {
+    const FeatureOptions options{.num_features = num_features};
+    const auto extract = [&](const std::vector<int32_t>& min_priority, uint32_t seed) {
+      std::mt19937 random(seed);
+      Extractor extractor;
+      std::vector<TileFeatures> tiles;
+      for (TileJob& job : CutFrame(frame, calibration, 99, {2, 3}, 3, options)) {
+        if (seed == 0 || random() % 4 > 0) job.min_priority = min_priority;  // some may be asked for all
+        tiles.push_back(extractor.Extract(job));
+        EXPECT_THAT(CheckTileFeatures(tiles.back()), IsSuccess());
+      }
+      return tiles;
+    };
+    const std::vector<TileFeatures> whole = extract({}, 0);
+    const Selection expected = SelectFeatures(whole).value();
+    int num_selected = 0;
+    for (uint32_t tenths = 0; tenths <= 12; ++tenths) {
+      std::vector<int32_t> guess = expected.lowest_priority;
+      for (int32_t& priority : guess) priority = priority / 10 * static_cast<int32_t>(tenths);
+      const std::vector<TileFeatures> tiles = extract(guess, tenths);
+      const std::optional<Selection> selection = SelectFeatures(tiles);
+      EXPECT_TRUE(selection || tenths > 10) << "nothing that is needed was left out";
+      if (!selection) continue;
+      ++num_selected;
+      ExpectSame(selection->features, expected.features, std::to_string(tenths) + " tenths");
+      EXPECT_EQ(selection->lowest_priority, expected.lowest_priority);
+    }
+    EXPECT_GE(num_selected, 11);
+  }
+}
+
+TEST(Lossless, AGoodGuessLeavesMostOut) {
+  const CameraFrame frame = MakeFrame(SensorType::kMono, MakeTexture(1241, 376, 13));
+  const CameraCalibration calibration = MakeCalibration(SensorType::kMono, 1241, 376);
+  const FeatureOptions options{.num_features = 1000};
+  Extractor extractor;
+  std::vector<int32_t> guess;
+  for (int turn = 0; turn < 2; ++turn) {
+    std::vector<TileFeatures> tiles;
+    size_t num_sent = 0;
+    for (TileJob& job : CutFrame(frame, calibration, 99, {2, 4}, 4, options)) {
+      job.min_priority = guess;
+      tiles.push_back(extractor.Extract(job));
+      num_sent += tiles.back().candidates.size();
+    }
+    const std::optional<Selection> selection = SelectFeatures(tiles);
+    ASSERT_TRUE(selection);
+    guess = selection->lowest_priority;
+    if (turn == 0) {
+      EXPECT_GT(num_sent, 2000U);
+    } else {
+      EXPECT_LE(num_sent, 1010U) << "ties of the lowest priority apart, those that are chosen";
+    }
+  }
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ std::vector<FeatureFrame> Expected() {
     for (const TileJob& job : CutFrame(Frame(id), kRig, 0, {}, 4, FeatureOptions{})) {
       tiles.push_back(extractor.Extract(job));
     }
-    frames.push_back(SelectFeatures(tiles));
+    frames.push_back(SelectFeatures(tiles).value().features);
   }
   return frames;
 }

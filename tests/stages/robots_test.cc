@@ -67,7 +67,7 @@ std::vector<FeatureFrame> FeaturesAlone(const Robot& robot) {
     for (const TileJob& job : CutFrame(FrameOf(robot, id), CalibrationOf(robot), 0, {}, 4, FeatureOptions{})) {
       tiles.push_back(extractor.Extract(job));
     }
-    frames.push_back(SelectFeatures(tiles));
+    frames.push_back(SelectFeatures(tiles).value().features);
   }
   return frames;
 }

@@ -118,6 +118,7 @@ TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
   job.num_tiles = Draw(generator, 1, 17);
   job.tile = job.num_tiles - 1;
   job.calibration = DrawCalibration(generator, width, height);
+  if (Draw(generator, 0, 1) == 1) job.min_priority = {5, 0, 1 << 28, 7, 0, 0, 9, 1};
   job.first_level = 1;
   job.last_level = 4;
   job.left_rect = {2, 3, width - 4, height - 5};
@@ -149,6 +150,9 @@ TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   features.num_tiles = 3;
   features.tile = Draw(generator, 0, 2);
   features.calibration = DrawCalibration(generator, 640, 480);
+  if (Draw(generator, 0, 1) == 1) {
+    for (int level = 0; level < 8; ++level) features.cuts.push_back({Draw(generator, 0, 99), Draw(generator, 0, 999)});
+  }
   const int num_candidates = size == 0 ? 0 : Draw(generator, 100, 3000);
   for (int i = 0; i < num_candidates; ++i) {
     features.candidates.push_back({.x = static_cast<int16_t>(Draw(generator, 0, 639)),
@@ -171,13 +175,16 @@ bool AreSame(const TileFeatures& a, const TileFeatures& b) {
 
 template <>
 TileAck DrawValue<TileAck>(std::mt19937& generator, int size) {
-  TileAck ack{.frame = {Draw(generator, 0, 999)}, .tiles = {}};
+  TileAck ack{
+      .frame = {Draw(generator, 0, 999)}, .tiles = {}, .wants_all = Draw(generator, 0, 1) == 1, .lowest_priority = {}};
+  for (int level = 0; level < 4 * size; ++level) ack.lowest_priority.push_back(Draw(generator, 0, 1 << 28));
   for (int i = 0; i < 8 * size; ++i) ack.tiles.push_back(Draw(generator, 0, 99));
   return ack;
 }
 template <>
 bool AreSame(const TileAck& a, const TileAck& b) {
-  return a.frame == b.frame && a.tiles == b.tiles;
+  return a.frame == b.frame && a.tiles == b.tiles && a.wants_all == b.wants_all &&
+         a.lowest_priority == b.lowest_priority;
 }
 
 template <>

@@ -120,7 +120,7 @@ FeatureFrame ExtractWhole(const CameraFrame& frame, const FeatureOptions& option
   std::vector<TileFeatures> tiles;
   for (const TileJob& job : CutFrame(frame, calibration, 99, TileGrid{}, 0, options))
     tiles.push_back(extractor.Extract(job));
-  return SelectFeatures(tiles);
+  return SelectFeatures(tiles).value().features;
 }
 
 }  // namespace tessera

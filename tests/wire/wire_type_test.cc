@@ -72,10 +72,10 @@ struct ExactFit {
 
 TEST(WireType, OnlyWholeMessagesMatch) { ForEachValueType(ExactFit()); }
 
-// The count of a tile_ack_t stands before its tiles, in the last 4 + 4 num_tiles bytes.
+// The count of a tile_ack_t stands before its tiles, 4 + 4 num_tiles bytes, and what follows them: 1 + 4 bytes.
 Bytes AckWithCount(uint32_t count) {
   Bytes message = EncodeValue(TileAck{.frame = {1}, .tiles = {5, 6}}, ExampleHeader(), 2000)[0];
-  for (size_t i = 0; i < 4; ++i) message[message.size() - 12 + i] = static_cast<uint8_t>(count >> (24 - 8 * i));
+  for (size_t i = 0; i < 4; ++i) message[message.size() - 17 + i] = static_cast<uint8_t>(count >> (24 - 8 * i));
   return message;
 }
 

@@ -45,6 +45,7 @@ DispatcherStage::DispatcherStage(StageContext& context)
     context_.SetValue("gave_up", session_.has_given_up() ? 1.0 : 0.0);
     context_.SetValue("extractors", session_.queue().num_extractors());
     context_.SetValue("jobs_given_again", static_cast<double>(session_.queue().num_given_again()));
+    context_.SetValue("jobs_wanted_whole", static_cast<double>(session_.queue().num_wanted_whole()));
   });
 }
 

@@ -37,7 +37,7 @@ ReassemblerStage::ReassemblerStage(StageContext& context) : context_(context), a
       FinishIfDone();
     }
   });
-  acks_.Publish({.frame = {0}, .tiles = {}});  // nothing is here yet
+  acks_.Publish({.frame = {0}, .tiles = {}, .wants_all = false, .lowest_priority = {}});  // nothing is here yet
 }
 
 void ReassemblerStage::OnTile(const TileFeatures& tile) {
@@ -51,25 +51,34 @@ void ReassemblerStage::OnTile(const TileFeatures& tile) {
                          std::to_string(tile.tile) + " are refused: " + checked.error().sentence);
     return;
   }
-  if (assembler_.Add(tile) == FrameAssembler::Result::kRefused) {
+  const FrameAssembler::Result added = assembler_.Add(tile);
+  if (added == FrameAssembler::Result::kRefused) {
     context_.ReportError("tile " + std::to_string(tile.tile) + " of frame " + std::to_string(tile.frame.value) +
                          " contradicts the tiles that came before it, or too many frames are open: it is refused");
     return;
   }
   // Acknowledged also when repeated: the first acknowledgement may be what was late.
-  acks_.Publish({.frame = tile.frame, .tiles = {tile.tile}});
+  const bool wants_all = added == FrameAssembler::Result::kTooFew;
+  acks_.Publish({.frame = tile.frame, .tiles = {tile.tile}, .wants_all = wants_all, .lowest_priority = {}});
   Release();
 }
 
 void ReassemblerStage::Release() {
   while (assembler_.CanRelease()) {
-    FeatureFrame frame;
+    std::optional<Selection> selection;
     {
       const StepTimer timer(context_);
-      frame = assembler_.ReleaseNext();
+      selection = assembler_.ReleaseNext();
     }
-    features_.Publish(frame);
+    if (!selection) break;
+    features_.Publish(selection->features);
+    if (selection->lowest_priority.empty()) continue;
+    acks_.Publish({.frame = selection->features.frame,
+                   .tiles = {},
+                   .wants_all = false,
+                   .lowest_priority = std::move(selection->lowest_priority)});
   }
+  for (const TileAck& forgotten : assembler_.TakeForgotten()) acks_.Publish(forgotten);
   context_.SetQueue(assembler_.num_open_frames());
   FinishIfDone();
 }
