@@ -9,6 +9,8 @@
 #include "tessera/tile_ack_t.hpp"
 #include "tessera/tile_features_t.hpp"
 #include "tessera/tile_job_t.hpp"
+#include "tessera/tile_origin_t.hpp"
+#include "tessera/tile_plan_t.hpp"
 #include "wire/codec_impl.h"
 
 namespace tessera {
@@ -17,22 +19,27 @@ namespace {
 constexpr int32_t kMaxTiles = 1 << 16;
 constexpr int32_t kMaxPackedBytes = 1 << 28;
 
-// What jobs and their answers have in common.
+// What all parts of jobs and of their answers have in common.
 template <class Fields, class Message, class Value>
 void DescribeTile(Fields& fields, Message& message, Value& tile) {
   fields.Key(message.run, tile.run);
   fields.Key(message.frame, tile.frame);
+  fields.Key(message.tile, tile.tile);
+  fields.Key(message.num_tiles, tile.num_tiles);
+  fields.Check(tile.frame.valid(), "its frame number is negative");
+  fields.Check(tile.num_tiles <= kMaxTiles && tile.tile >= 0 && tile.tile < tile.num_tiles,
+               "its tile number is out of range");
+}
+
+// What the first part of either brings.
+template <class Fields, class Message, class Value>
+void DescribeOrigin(Fields& fields, Message& message, Value& tile) {
   fields(message.previous_frame, tile.previous_frame);
   fields.Time(message.utime, tile.utime_us);
   fields.Time(message.captured, tile.captured_us);
-  fields.Key(message.tile, tile.tile);
-  fields.Key(message.num_tiles, tile.num_tiles);
   fields(message.camera, tile.calibration);
   fields(message.options, tile.options);
-  fields.Check(tile.frame.valid() && tile.previous_frame < tile.frame,
-               "its frame number is negative, or not above that of the frame before it");
-  fields.Check(tile.num_tiles <= kMaxTiles && tile.tile >= 0 && tile.tile < tile.num_tiles,
-               "its tile number is out of range");
+  fields.Check(tile.previous_frame < tile.frame, "its frame number is not above that of the frame before it");
 }
 
 bool IsInRange(const Candidate& candidate, const CameraCalibration& camera, const FeatureOptions& options) {
@@ -45,10 +52,10 @@ bool IsInRange(const Candidate& candidate, const CameraCalibration& camera, cons
 }  // namespace
 
 template <>
-struct Layout<tile_job_t> {
+struct Layout<tile_plan_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& job) {
-    DescribeTile(fields, message, job);
+    DescribeOrigin(fields, message, job);
     fields(message.first_level, job.first_level);
     fields(message.last_level, job.last_level);
     fields(message.core, job.core);
@@ -68,6 +75,15 @@ struct Layout<tile_job_t> {
     fields.Check(job.min_priority.size() <= kMaxLevels, "it names more levels than a pyramid has");
     fields(message.num_packed, job.packed.width);
     fields.Check(job.packed.width >= 0 && job.packed.width <= kMaxPackedBytes, "its packed images are too large");
+  }
+};
+
+template <>
+struct Layout<tile_job_t> {
+  template <class Fields, class Message, class Value>
+  static void Describe(Fields& fields, Message& message, Value& job) {
+    DescribeTile(fields, message, job);
+    fields.Once(message.num_plans, message.plan, job);
     const bool is_packed = job.packed.width > 0;
     const auto image = [is_packed](int8_t name, auto& pixels, const Rect& rect) {
       return ImageField{name, pixels, is_packed ? 0 : rect.width, is_packed ? 0 : rect.height};
@@ -81,14 +97,23 @@ struct Layout<tile_job_t> {
 TESSERA_CODEC(TileJob, tile_job_t);
 
 template <>
-struct Layout<tile_features_t> {
+struct Layout<tile_origin_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& tile) {
-    DescribeTile(fields, message, tile);
+    DescribeOrigin(fields, message, tile);
     fields.Table(
         message.num_levels, [&](size_t i) { return i < kMaxLevels && tile.cuts[i].num_found >= 0; },
         Column(message.min_priority, tile.cuts, &LevelCut::min_priority),
         Column(message.num_found, tile.cuts, &LevelCut::num_found));
+  }
+};
+
+template <>
+struct Layout<tile_features_t> {
+  template <class Fields, class Message, class Value>
+  static void Describe(Fields& fields, Message& message, Value& tile) {
+    DescribeTile(fields, message, tile);
+    fields.Once(message.num_origins, message.origin, tile);
     auto& candidates = tile.candidates;
     fields.WholeTable(
         message.num_total, message.first, message.num_candidates,

@@ -68,6 +68,12 @@ class PartReader {
     return const_cast<Pointee&>(*pointer);
   }
 
+  template <class Item, class Value>
+  void Once(int32_t num, const std::vector<Item>& items, Value& value) {
+    Check(num == (begins_ ? 1 : 0), kUnfit);
+    if (begins_ && verdict_) (*this)(items[0], value);
+  }
+
   template <class Item, class Member>
   void List(int32_t num, const std::vector<Item>& items, std::vector<Member>& members) {
     Check(members.size() + static_cast<size_t>(num) <= kMaxItems, "one of its lists is longer than any would be");

@@ -57,6 +57,22 @@ class PartWriter {
     return *pointer;
   }
 
+  template <class Item, class Value>
+  void Once(int32_t& num, std::vector<Item>& items, const Value& value) {
+    items.clear();
+    size_t& next = next_of_list();
+    ++list_;
+    const bool is_first = next == 0 && !is_empty_part_;
+    if (is_first) {
+      PartWriter whole;
+      whole.BeginPart(SIZE_MAX);
+      whole(items.emplace_back(), value);
+      Fits(WireSize(items.back()));
+      next = 1;
+    }
+    num = is_first ? 1 : 0;
+  }
+
   template <class Item, class Member>
   void List(int32_t& num, std::vector<Item>& items, const std::vector<Member>& members) {
     items.clear();
