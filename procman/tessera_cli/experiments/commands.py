@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tessera_cli.constants import EXPERIMENT_POLL_S, EXPERIMENT_STOP_TIMEOUT_S
+from tessera_cli.errors import RunError
+from tessera_cli.experiments.plan import read_complete
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.supervision.command_list import LocalCommand
 from tessera_cli.supervision.private_deputy import PrivateDeputy, single_process
@@ -27,7 +29,7 @@ class CommandRunner:
         environment: dict[str, str],
         look: Callable[[str], None],
     ) -> float:
-        """CPU seconds of the command and its descendants, when it has ended with status 0.
+        """CPU seconds of the command and its descendants, when it has ended with status 0, or as a run in doubt.
 
         `look` gets the last line of its output, again and again.
         Raises UserError or RunError, with its last line and the log's path, if it failed; KeyboardInterrupt if
@@ -46,6 +48,11 @@ class CommandRunner:
                 look(deputy.last_line(name))
                 time.sleep(EXPERIMENT_POLL_S)
                 deputy.step()
+        except RunError:
+            # A run whose scale may have slipped is a result, too.
+            summary = read_complete(folder)
+            if summary is None or not summary.get("doubts"):
+                raise
         finally:
             deputy.kill()
         return sum(each.cpu_s for each in deputy.processes)

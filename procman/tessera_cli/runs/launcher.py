@@ -28,7 +28,7 @@ from tessera_cli.runs.ports import PortLock, take_free_port
 from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, require_no_run
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
-from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, occupancy_warnings, write_summary
+from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, is_trustworthy, occupancy_warnings, write_summary
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import read_process_list
@@ -172,7 +172,7 @@ class Launcher:
         # A live source has no end of its own: to interrupt it is the ordinary way.
         said = result.summary["ended"]
         ended_well = said == "complete" or (said == "interrupted" and self._source.is_live)
-        return 0 if ended_well and not result.summary["not_written"] else 1
+        return 0 if ended_well and is_trustworthy(result.summary) else 1
 
     def _why_nothing_was_located(self, num_frames: int) -> str:
         said = f"no pose was found for any of {num_frames} frames"

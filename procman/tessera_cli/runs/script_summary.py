@@ -9,7 +9,7 @@ import numpy as np
 
 from tessera_cli.messages import procman_process_t, procman_status_t
 from tessera_cli.runs.run_folder import read_frames
-from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, write_summary
+from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, is_trustworthy, write_summary
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.list_monitor import ListMonitor
 from tessera_cli.supervision.sheriff import Sheriff
@@ -34,7 +34,7 @@ class ScriptWatcher:
         self._name, self._assignments, self._values = name, assignments, values
         self._monitor = ListMonitor(values["bus"]["main_url"], values["bus"]["channel_prefix"])
         self._usages: dict[tuple[str, int], ProcessUsage] = {}  # by process and number of its start
-        self.is_whole = True  # no file of the run that it has summed up is missing
+        self.is_trustworthy = True  # as is_trustworthy() has it, of the run that it has summed up
         self._earlier_starts: dict[str, int] = {}  # before this run
         self.ended = ""  # as in summary.json; empty: nothing was summed up
         self._camera_at: float | None = None  # monotonic seconds
@@ -75,7 +75,7 @@ class ScriptWatcher:
         result = write_summary(folder, self._run_facts(folder), self._process_facts())
         self.ended = result.summary["ended"]
         words = present(result, folder)
-        self.is_whole = not result.summary["not_written"]
+        self.is_trustworthy = is_trustworthy(result.summary)
         return words
 
     def _run_facts(self, folder: Path) -> RunFacts:

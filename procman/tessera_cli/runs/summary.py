@@ -87,6 +87,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
     evaluated = _read_evaluation(folder)
     not_written = [*evaluated.get("not_written", []), *facts.not_written]
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
+    doubts = scale_warnings(result.frames, facts.sensor)
     summary: Summary = {
         "source": without_password(facts.source),
         "sensor": facts.sensor,
@@ -108,13 +109,19 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         + read_source_events(folder / "stages")
         + drop_warnings(evaluated, result)
         + latency_warnings(result)
-        + scale_warnings(result.frames, facts.sensor),
+        + doubts,
+        "doubts": doubts,
         "not_written": not_written,
         "versions": collect_versions(),
     }
     with noting_if_not_written(summary, "summary.json"):
         write_text(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     return replace(result, summary=summary)
+
+
+def is_trustworthy(summary: Summary) -> bool:
+    """Nothing of the run is missing, and it doubts none of its poses."""
+    return not summary["not_written"] and not summary["doubts"]
 
 
 def judge_end(ended: str, evaluated: dict[str, Any]) -> str:

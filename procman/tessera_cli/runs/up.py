@@ -43,7 +43,7 @@ def up(arguments: Namespace, present: Present) -> int:
         say(f"script {arguments.script} ended well after {time.monotonic() - began:.1f} s")
         if words := watcher.sum_up(present):
             print(words)
-        return 0 if watcher.ended in ("", "complete") and watcher.is_whole else 1
+        return 0 if watcher.ended in ("", "complete") and watcher.is_trustworthy else 1
     names = list(process_list.processes)
     runner.start(names)
     runner.wait(names, "ready", arguments.timeout)

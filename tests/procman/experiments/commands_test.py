@@ -55,6 +55,15 @@ def test_arguments_at_fault_stay_a_user_error(tmp_path: Path, interrupt: Interru
         run(tmp_path, interrupt, "echo there is no folder; exit 2")
 
 
+def test_a_run_that_doubts_its_scale_is_a_result(tmp_path: Path, interrupt: Interrupt) -> None:
+    summary = tmp_path / "summary.json"
+    summary.write_text('{"ended": "complete", "doubts": ["The scale may have slipped."]}')
+    run(tmp_path, interrupt, "exit 1")
+    summary.write_text('{"ended": "complete", "doubts": []}')
+    with pytest.raises(RunError):
+        run(tmp_path, interrupt, "exit 1")
+
+
 def test_a_missing_program_is_a_failure(tmp_path: Path, interrupt: Interrupt) -> None:
     with pytest.raises(RunError, match="can't be started"):
         CommandRunner(tmp_path, interrupt).run("build", ["/no/such/program"], tmp_path, {}, lambda _line: None)

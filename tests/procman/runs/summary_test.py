@@ -11,6 +11,7 @@ from tessera_cli.messages import stage_status_t
 from tessera_cli.runs.run_folder import Frames, Result, read_log_warnings, read_source_events
 from tessera_cli.runs.summary import (
     drop_warnings,
+    is_trustworthy,
     judge_end,
     latency_warnings,
     occupancy_sha256,
@@ -39,6 +40,12 @@ def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None =
         scale_sigma=scale_sigma,
         numbers=np.arange(num),
     )
+
+
+def test_a_run_that_lacks_a_file_or_doubts_its_scale_is_not_to_be_trusted() -> None:
+    assert is_trustworthy({"not_written": [], "doubts": []})
+    assert not is_trustworthy({"not_written": ["map.ply can't be written"], "doubts": []})
+    assert not is_trustworthy({"not_written": [], "doubts": scale_warnings(_frames(400, [10]), "mono")})
 
 
 def test_nothing_is_said_where_nothing_is_doubtful() -> None:
