@@ -56,10 +56,12 @@ def test_arguments_at_fault_stay_a_user_error(tmp_path: Path, interrupt: Interru
 
 
 def test_a_run_that_doubts_its_scale_is_a_result(tmp_path: Path, interrupt: Interrupt) -> None:
-    summary = tmp_path / "summary.json"
-    summary.write_text('{"ended": "complete", "doubts": ["The scale may have slipped."]}')
+    (tmp_path / "summary.json").write_text('{"ended": "complete", "doubts": ["The scale may have slipped."]}')
     run(tmp_path, interrupt, "exit 1")
-    summary.write_text('{"ended": "complete", "doubts": []}')
+
+
+def test_a_run_that_failed_without_doubts_is_a_failure(tmp_path: Path, interrupt: Interrupt) -> None:
+    (tmp_path / "summary.json").write_text('{"ended": "complete", "doubts": []}')
     with pytest.raises(RunError):
         run(tmp_path, interrupt, "exit 1")
 
