@@ -25,7 +25,7 @@ from tessera_cli.interrupt import Interrupt
 from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
 from tessera_cli.runs.ports import PortLock, take_free_port
-from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, require_no_run
+from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, remove_journals, require_no_run
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, occupancy_warnings, write_summary
@@ -39,8 +39,8 @@ from tessera_cli.versions import tessera_version
 
 PROCESS_LIST = PROCMAN / "local.pmd"
 BUSY_BUS = "another stack runs on this bus: end it, or give --port N to keep the two apart."
-# Stages whose long steps frames may have to wait for.
-MAP_STAGES = ("mapper", "loop_closer", "global_adjuster")
+# Stages whose long steps, or journals when they were killed, frames may have to wait for.
+MAP_STAGES = ("tracker", "mapper", "loop_closer", "global_adjuster")
 
 
 def run_stack(arguments: Namespace, present: Present) -> int:
@@ -90,6 +90,8 @@ def _make_launcher(
         require_no_run(folder)
     remove_earlier_run(folder)
     values = write_settings(assignments, folder / "settings.yaml")
+    remove_journals(values)
+    cleanup.callback(remove_journals, values)
     if run_dir := _take_bus(arguments, source, values):
         cleanup.callback(run_dir.end)
     deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
