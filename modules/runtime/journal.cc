@@ -77,6 +77,9 @@ Journal::Journal(std::string path, int64_t epoch_us, int64_t max_bytes)
   file_ = open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (file_ < 0) ThrowUnusable(path_);
   if (!reader_) return;
+  std::fseek(reader_.get(), 0, SEEK_END);
+  size_ = std::ftell(reader_.get());
+  std::rewind(reader_.get());
   const std::optional<Entry> title = Read();
   is_lost_ = !title || title->channel != kTitle;
   if (is_lost_) reader_.reset();
@@ -103,8 +106,7 @@ void Journal::Begin(int64_t epoch_us) {
 std::optional<Journal::Entry> Journal::Read() {
   Head head;
   if (std::fread(&head, sizeof(head), 1, reader_.get()) != 1) return std::nullopt;
-  const auto num_left = static_cast<int64_t>(std::filesystem::file_size(path_)) - std::ftell(reader_.get());
-  if (head.num_bytes > num_left) return std::nullopt;
+  if (head.num_bytes > size_ - std::ftell(reader_.get())) return std::nullopt;
   Bytes content(head.num_bytes);
   if (std::fread(content.data(), 1, content.size(), reader_.get()) != content.size() ||
       Crc32(content) != head.checksum) {

@@ -59,6 +59,7 @@ class Journal {
   int64_t epoch_us_ = 0;
   bool is_lost_ = false;
   std::unique_ptr<std::FILE, CloseFile> reader_;
+  int64_t size_ = 0;       // of the file when it was opened for reading
   int64_t num_bytes_ = 0;  // of whole entries, as far as they are read or written
   int file_ = -1;          // that is written
 };

@@ -223,12 +223,21 @@ def test_stages_that_are_killed_one_after_the_other_change_nothing(
     assert not (run.folder / "journal").exists()
 
 
-def test_a_tracker_that_is_killed_when_its_journal_was_given_up_ends_the_run(tessera: Tessera, sequence: Path) -> None:
-    run = KilledRun(tessera, sequence, "--set", "stream.journal_mb=1", "--pace", 0.5)
-    run.kill("tracker", NUM_FRAMES // 2)
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("stream.journal_mb=1", "can't continue where it was killed: its journal had been given up"),
+        ("stream.journal_dir=", "tracker was killed by SIGKILL"),
+    ],
+)
+def test_a_tracker_that_is_killed_without_its_journal_ends_the_run(
+    tessera: Tessera, sequence: Path, setting: str, sentence: str
+) -> None:
+    run = KilledRun(tessera, sequence, "--set", setting, "--pace", 0.5)
+    run.kill("tracker", NUM_FRAMES // 3)
     status, out = run.end()
     assert status == 1, out
-    assert "can't continue where it was killed: its journal had been given up" in out
+    assert sentence in out
     assert not pids_of(run.folder)
 
 

@@ -10,8 +10,6 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "messages/loop_types.h"
-#include "messages/tracking_types.h"
 #include "support/memory_bus.h"
 #include "support/temporary_folder.h"
 

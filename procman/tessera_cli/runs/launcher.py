@@ -7,6 +7,7 @@ import shutil
 import time
 from argparse import Namespace
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from tessera_cli.cluster.keys import key_folder
@@ -31,7 +32,7 @@ from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, occupancy_warnings, write_summary
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
-from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.process_list import Process, read_process_list
 from tessera_cli.supervision.silence import SilenceWatch
 from tessera_cli.supervision.stack_monitor import StackMonitor, hear_heartbeats, is_of_this_machine
 from tessera_cli.supervision.state_folder import LogFolder
@@ -94,8 +95,16 @@ def _make_launcher(
     cleanup.callback(remove_journals, values)
     if run_dir := _take_bus(arguments, source, values):
         cleanup.callback(run_dir.end)
-    deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
+    processes = [_without_journal(process, values) for process in process_list.processes.values()]
+    deputy = PrivateDeputy(logs, folder / "settings.yaml", processes)
     return Launcher(arguments, source, folder, values, deputy, present)
+
+
+def _without_journal(process: Process, values: Settings) -> Process:
+    """A tracker that keeps no journal can't continue, and nobody can replace it."""
+    if process.command != "tracker" or values["stream"]["journal_dir"]:
+        return process
+    return replace(process, options=replace(process.options, auto_respawn="never"))
 
 
 def _take_bus(arguments: Namespace, source: Source, values: Settings) -> RunDir | None:
