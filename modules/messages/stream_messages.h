@@ -10,6 +10,7 @@ namespace tessera {
 // How far one stream has come.
 struct StreamHead {
   std::string channel;         // without prefix
+  int64_t epoch_us = 0;        // when it began: when its publisher started, or an earlier life that this one continues
   int64_t first_sequence = 0;  // oldest message that can still be repaired
   int64_t next_sequence = 0;   // number that the next message will have
   bool is_exclusive = false;   // a second publisher on this channel is an error
@@ -38,7 +39,7 @@ struct SequenceRange {
 struct RepairRequest {
   std::string channel;  // without prefix
   std::string publisher;
-  int64_t epoch_us = 0;  // when the publisher started
+  int64_t epoch_us = 0;  // when the stream began
   std::vector<SequenceRange> ranges;
 
   bool operator==(const RepairRequest&) const = default;

@@ -36,6 +36,15 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   auto subscription = std::make_unique<Subscription>();
   subscription->channel = channel.name;
   subscription->type = &WireType::Named(type);
+  subscription->bus = std::move(bus);
+  const bool is_journaled = journaled_.contains(channel.name);
+  if (is_journaled) {
+    sink.deliver = [this, name = channel.name, deliver = std::move(sink.deliver)](
+                       ByteView message, const MessageHeader& header, int64_t arrival_us) {
+      WriteJournal(name, message, arrival_us);
+      deliver(message, header, arrival_us);
+    };
+  }
   if (channel.delivery == Delivery::kUnordered) {
     subscription->sink = std::move(sink);
   } else {
@@ -44,12 +53,46 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
     options.discards_at_restart = true;  // a frame behind a missing one would be taken for the next
     subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
   }
-  bus->Subscribe(this, settings_.channel_prefix + channel.name,
-                 [this, heard = subscription.get()](const std::string&, ByteView message, int64_t arrival_us) {
-                   OnMessage(*heard, message, arrival_us);
-                 });
+  if (!is_journaled || !journal_->is_replaying()) Open(*subscription);
   subscriptions_.push_back(std::move(subscription));
-  buses_.push_back(std::move(bus));
+}
+
+void IncomingStreams::Open(Subscription& subscription) {
+  subscription.is_open = true;
+  subscription.bus->Subscribe(this, settings_.channel_prefix + subscription.channel,
+                              [this, &subscription](const std::string&, ByteView message, int64_t arrival_us) {
+                                OnMessage(subscription, message, arrival_us);
+                              });
+  buses_.push_back(subscription.bus);
+}
+
+void IncomingStreams::KeepJournal(const std::set<std::string>& channels, Journal* journal) {
+  journaled_ = channels;
+  journal_ = journal;
+}
+
+// Before the message is handled: what the stage says because of it must be found again.
+void IncomingStreams::WriteJournal(const std::string& channel, ByteView message, int64_t arrival_us) {
+  if (journal_->is_replaying()) return;
+  if (const Result<> written = journal_->Append(channel, message, arrival_us); !written) {
+    report_(written.error().sentence);
+  }
+}
+
+void IncomingStreams::Replay(const Journal::Entry& entry) {
+  const auto subscription = std::find_if(subscriptions_.begin(), subscriptions_.end(), [&](const auto& candidate) {
+    return candidate->receiver && candidate->channel == entry.channel;
+  });
+  auto header = ReadHeader(entry.message);
+  if (subscription == subscriptions_.end() || !header) return;
+  header->is_from_outside = SenderOf(entry.channel, entry.message) == Sender::kOutside;
+  (*subscription)->receiver->Replay(*header, entry.message, entry.arrival_us, clock_.NowUs());
+}
+
+void IncomingStreams::EndReplay() {
+  for (const auto& subscription : subscriptions_) {
+    if (!subscription->is_open) Open(*subscription);
+  }
 }
 
 IncomingStreams::Sender IncomingStreams::SenderOf(const std::string& channel, ByteView message) const {
@@ -146,17 +189,17 @@ void IncomingStreams::AbandonRaw() {
   for (const auto& [channel, receiver] : raw_) receiver->Abandon();
 }
 
-void IncomingStreams::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat) {
+void IncomingStreams::OnHeartbeat(const std::string& publisher, const Heartbeat& heartbeat) {
   const int64_t now_us = clock_.NowUs();
   for (const StreamHead& head : heartbeat.streams) {
     for (const auto& subscription : subscriptions_) {
-      if (subscription->receiver && subscription->channel == head.channel) {
-        subscription->receiver->OnHeartbeat(publisher, epoch_us, head, now_us);
+      if (subscription->receiver && subscription->is_open && subscription->channel == head.channel) {
+        subscription->receiver->OnHeartbeat(publisher, head, now_us);
       }
     }
     if (!raw_handler_) continue;
     if (ChannelReceiver* receiver = RawReceiver(head.channel)) {
-      receiver->OnHeartbeat(publisher, epoch_us, head, now_us);
+      receiver->OnHeartbeat(publisher, head, now_us);
     }
   }
 }

@@ -6,12 +6,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "runtime/bus.h"
 #include "runtime/clock.h"
+#include "runtime/journal.h"
 #include "runtime/stream_settings.h"
 #include "streams/channel_receiver.h"
 #include "wire/wire_type.h"
@@ -44,7 +46,15 @@ class IncomingStreams {
   // Unsubscribes from everything.
   void Close();
 
-  void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat);
+  // What is delivered on these channels, which are to be added after this, goes into the journal before. As long as
+  // that one is replayed, nothing else is heard on them.
+  void KeepJournal(const std::set<std::string>& channels, Journal* journal);
+  // Delivers a message that was delivered in an earlier life.
+  void Replay(const Journal::Entry& entry);
+  // All that is in the journal was replayed: listens to its channels.
+  void EndReplay();
+
+  void OnHeartbeat(const std::string& publisher, const Heartbeat& heartbeat);
   // To be called when no message waits: what has to be asked for now.
   std::vector<RepairRequest> Poll();
   // When Poll has something to do, by the clock; nullopt: not before something comes.
@@ -64,10 +74,14 @@ class IncomingStreams {
     const WireType* type = nullptr;
     std::unique_ptr<ChannelReceiver> receiver;  // null: unordered
     ChannelReceiver::Sink sink;
+    std::shared_ptr<Bus> bus;
+    bool is_open = false;  // is listened to
     // Unordered: the newest message of each publisher, by epoch and sequence number.
     std::map<std::string, std::pair<int64_t, int64_t>> newest;
   };
   enum class Sender { kMember, kOutside, kStranger };
+  void Open(Subscription& subscription);
+  void WriteJournal(const std::string& channel, ByteView message, int64_t arrival_us);
   void OnMessage(Subscription& subscription, ByteView message, int64_t arrival_us);
   // Who sent a message on the channel (without prefix). All are members where messages are not checked.
   Sender SenderOf(const std::string& channel, ByteView message) const;
@@ -81,7 +95,9 @@ class IncomingStreams {
   std::function<void(const std::string&)> report_;
   std::vector<std::shared_ptr<Bus>> buses_;  // that are subscribed to
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
-  RawHandler raw_handler_;  // set while everything is recorded
+  Journal* journal_ = nullptr;
+  std::set<std::string> journaled_;  // channels
+  RawHandler raw_handler_;           // set while everything is recorded
   std::vector<std::shared_ptr<Bus>> raw_buses_;
   std::map<std::string, std::unique_ptr<ChannelReceiver>> raw_;  // by channel, without prefix
   int64_t num_undecodable_ = 0;

@@ -19,17 +19,26 @@ OutgoingStreams::OutgoingStreams(const StageIdentity& identity, const StreamSett
       resending_(kResentBytesPerSecond, 0.5 * static_cast<double>(settings.receive_buffer_bytes)) {}
 
 int OutgoingStreams::Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired) {
+  const bool is_continued = continued_.contains(channel.name);
   streams_.push_back({.channel = channel,
                       .full_name = settings_.channel_prefix + channel.name,
                       .bus = std::move(bus),
+                      .epoch_us = is_continued ? continued_epoch_us_ : identity_.epoch_us,
+                      .is_continued = is_continued,
                       .is_repaired = is_repaired,
                       .history = StreamHistory(settings_.history_bytes)});
   return static_cast<int>(streams_.size()) - 1;
 }
 
+void OutgoingStreams::BeginReplay(const std::set<std::string>& channels, int64_t epoch_us) {
+  continued_ = channels;
+  continued_epoch_us_ = epoch_us;
+  is_replaying_ = true;
+}
+
 MessageHeader OutgoingStreams::NextHeader(int stream, int64_t wall_us) const {
   return {.publisher = identity_.name,
-          .epoch_us = identity_.epoch_us,
+          .epoch_us = streams_[static_cast<size_t>(stream)].epoch_us,
           .sequence = streams_[static_cast<size_t>(stream)].num_sent,
           .publish_us = wall_us};
 }
@@ -41,22 +50,25 @@ size_t OutgoingStreams::MaxMessageBytes(int stream) const {
 bool OutgoingStreams::Send(int stream_number, std::vector<Bytes> messages, std::optional<int64_t> source_us) {
   Stream& stream = streams_[static_cast<size_t>(stream_number)];
   const bool is_kept = stream.is_repaired && stream.bus->can_listen();
+  const bool is_made_again = is_replaying_ && stream.channel.delivery != Delivery::kUnordered;
+  if (is_made_again && !stream.is_continued) return true;
   bool all_sent = true;
   for (Bytes& message : messages) {
     ++stream.num_sent;
     if (settings_.authenticator) settings_.authenticator->Sign(stream.full_name, &message);
     const Bytes& kept = is_kept ? stream.history.Append(std::move(message)) : message;
-    all_sent = stream.bus->Publish(stream.full_name, kept, source_us) && all_sent;
+    if (!is_made_again) all_sent = stream.bus->Publish(stream.full_name, kept, source_us) && all_sent;
   }
   return all_sent;
 }
 
 void OutgoingStreams::Resend(const RepairRequest& request, int64_t now_us) {
-  if (request.publisher != identity_.name || request.epoch_us != identity_.epoch_us) {
+  if (request.publisher != identity_.name) {
     return;
   }
-  const auto stream = std::find_if(streams_.begin(), streams_.end(),
-                                   [&](const Stream& candidate) { return candidate.channel.name == request.channel; });
+  const auto stream = std::find_if(streams_.begin(), streams_.end(), [&](const Stream& candidate) {
+    return candidate.channel.name == request.channel && candidate.epoch_us == request.epoch_us;
+  });
   if (stream == streams_.end()) {
     return;
   }
@@ -79,6 +91,7 @@ std::vector<Heartbeat> OutgoingStreams::MakeHeartbeats() const {
     if (!stream.is_repaired) continue;
     if (heartbeats.back().streams.size() == kStreamsPerHeartbeat) heartbeats.emplace_back();
     heartbeats.back().streams.push_back({.channel = stream.channel.name,
+                                         .epoch_us = stream.epoch_us,
                                          .first_sequence = stream.history.first(),
                                          .next_sequence = stream.history.next(),
                                          .is_exclusive = stream.channel.publishers == Publishers::kOne});

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,12 @@ class OutgoingStreams {
   // A new stream; returns its number here. `is_repaired`: its messages are kept and announced.
   int Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired);
 
+  // These channels continue streams that began at `epoch_us` in an earlier life of this process, and are to be added
+  // after this. Until EndReplay(), all of their messages are made again: they are kept, and not sent, since they were
+  // sent then; who lacks one will ask for it. Values of other ordered streams are passed over.
+  void BeginReplay(const std::set<std::string>& channels, int64_t epoch_us);
+  void EndReplay() { is_replaying_ = false; }
+
   // The header of the next value in the stream.
   MessageHeader NextHeader(int stream, int64_t wall_us) const;
   // The largest message that may be encoded for it.
@@ -54,6 +61,8 @@ class OutgoingStreams {
     Channel channel;
     std::string full_name;  // with prefix
     std::shared_ptr<Bus> bus;
+    int64_t epoch_us = 0;  // when it began
+    bool is_continued = false;
     bool is_repaired = true;
     StreamHistory history;
     int64_t num_sent = 0;
@@ -61,6 +70,9 @@ class OutgoingStreams {
   const StageIdentity identity_;
   const StreamSettings settings_;
   std::vector<Stream> streams_;
+  std::set<std::string> continued_;  // channels
+  int64_t continued_epoch_us_ = 0;
+  bool is_replaying_ = false;
   RateLimit resending_;  // bytes
 };
 

@@ -13,6 +13,13 @@ int64_t StageContext::epoch_us() const { return engine_.identity_.epoch_us; }
 int64_t StageContext::now_us() const { return engine_.clock_->NowUs(); }
 int64_t StageContext::wall_us() const { return engine_.clock_->WallUs(); }
 
+StageContext& StageContext::KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs) {
+  engine_.KeepJournal(inputs, outputs);
+  return *this;
+}
+
+bool StageContext::has_lost_journal() const { return engine_.has_lost_journal(); }
+
 int StageContext::AddStream(const Channel& channel) { return engine_.Advertise(channel); }
 
 void StageContext::Send(int stream, const Encoder& encode, std::optional<int64_t> source_us) {

@@ -67,6 +67,15 @@ class StageContext {
   // The wall clock, for measuring only.
   int64_t wall_us() const;
 
+  // What is published on the channels `outputs` is a pure function of what is received on `inputs`, in this order; a
+  // stage of which that holds is killed and started again without a trace: what it receives goes into a journal
+  // (journal.h), and is given to it once more. To be called before anything is advertised or subscribed to, hence
+  // what it returns: this. Timers and idle tasks rest until all of the journal was given. Throws InputError if it can't
+  // be kept.
+  StageContext& KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs);
+  // This process was started again, and its journal was given up before: it begins with nothing.
+  bool has_lost_journal() const;
+
   // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
   // Throws std::runtime_error if the channel may have one publisher only and another process is it.
   template <class Value>

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 #include <initializer_list>
+#include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -135,6 +137,30 @@ void StageEngine::Receive(const std::string& channel, ValueReceiver& receiver, D
   });
 }
 
+void StageEngine::KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs) {
+  if (stream_settings_.journal_dir.empty()) return;
+  const std::string path = stream_settings_.journal_dir + "/" + identity_.name + ".journal";
+  journal_ = std::make_unique<Journal>(path, identity_.epoch_us, stream_settings_.journal_bytes);
+  if (journal_->is_lost()) return;
+  const auto names_of = [](const std::vector<Channel>& channels) {
+    std::set<std::string> names;
+    for (const Channel& channel : channels) names.insert(channel.name);
+    return names;
+  };
+  incoming_.KeepJournal(names_of(inputs), journal_.get());
+  if (journal_->is_replaying()) outgoing_.BeginReplay(names_of(outputs), journal_->epoch_us());
+}
+
+// One at a time, so that heartbeats are sent between long steps.
+void StageEngine::ReplayOne() {
+  if (!is_replaying()) return;
+  if (const std::optional<Journal::Entry> entry = journal_->Next()) return incoming_.Replay(*entry);
+  outgoing_.EndReplay();
+  incoming_.EndReplay();
+  SendHeartbeats();  // who lacks the last messages asks for them
+  log_(false, "continues where it was when it was killed");
+}
+
 StageContext& StageEngine::Join(const std::string& channel_prefix) {
   Settings settings = settings_;
   settings.Override("bus.channel_prefix=" + channel_prefix);
@@ -180,7 +206,7 @@ void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageInfo& inf
   const int64_t now_us = clock_->NowUs();
   neighbors_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat, now_us);
   if (incoming_.hears_all()) ListenToExtractors(heartbeat);
-  incoming_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat);
+  incoming_.OnHeartbeat(info.publisher, heartbeat);
   auto conflict = neighbors_.ConflictOverName(now_us);
   for (const StreamHead& head : heartbeat.streams) {
     if (!conflict && outgoing_.IsExclusive(head.channel)) {
@@ -254,7 +280,7 @@ bool StageEngine::HandleMessages() {
 }
 
 void StageEngine::RunTimers() {
-  for (size_t i = 0; i < timers_.size() && !stopped_; ++i) {  // by index: a task may add a timer
+  for (size_t i = 0; i < timers_.size() && !stopped_ && !is_replaying(); ++i) {  // by index: a task may add a timer
     const int64_t now_us = clock_->NowUs();
     if (timers_[i].due_us > now_us) continue;
     timers_[i].due_us = now_us + timers_[i].period_us;
@@ -293,6 +319,7 @@ void StageEngine::PartFromFailed() {
 
 bool StageEngine::Step() {
   const bool some_wait = HandleMessages();  // of all prefixes: the buses are the same
+  ReplayOne();
   RunTimers();
   for (const auto& other : others_) {
     if (!other->is_silent_) other->RunTimers();
@@ -303,6 +330,7 @@ bool StageEngine::Step() {
   for (const auto& other : others_) {
     if (!other->is_silent_) other->AskForRepairs();
   }
+  if (is_replaying()) return true;
   bool again = RunIdleTasks();
   for (const auto& other : others_) again |= !other->is_silent_ && other->RunIdleTasks();
   return again;

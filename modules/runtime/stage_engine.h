@@ -13,6 +13,7 @@
 #include "runtime/bus.h"
 #include "runtime/clock.h"
 #include "runtime/incoming_streams.h"
+#include "runtime/journal.h"
 #include "runtime/neighbors.h"
 #include "runtime/outgoing_streams.h"
 #include "runtime/stage.h"
@@ -50,6 +51,8 @@ class StageEngine {
   enum class Listener { kEngine, kStage };
   void Subscribe(const Channel& channel, const char* type, MakeReceiver make_receiver, Listener listener);
   void SubscribeAll(IncomingStreams::RawHandler handler);
+  void KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs);
+  bool has_lost_journal() const { return journal_ && journal_->is_lost(); }
   StageContext& Join(const std::string& channel_prefix);
   void ReportError(const std::string& sentence);
   void Fail(const std::string& sentence, int exit_status);
@@ -88,6 +91,7 @@ class StageEngine {
   std::map<std::string, std::shared_ptr<Bus>> buses_;  // by URL
   StageFigures figures_;
   Neighbors neighbors_;
+  std::unique_ptr<Journal> journal_;  // null: none is kept
   OutgoingStreams outgoing_;
   IncomingStreams incoming_;
   std::vector<Timer> timers_;
@@ -108,6 +112,8 @@ class StageEngine {
   void SendValue(int stream, const Value& value);
   bool is_over() const { return stopped_ || root_->stopped_; }
   bool HandleMessages();
+  bool is_replaying() const { return journal_ && journal_->is_replaying(); }
+  void ReplayOne();
   void RunTimers();
   void AskForRepairs();
   bool RunIdleTasks();

@@ -22,6 +22,8 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   receiver.unwatched_us = std::max<int64_t>(300'000, 3 * result.heartbeat_us);
   receiver.max_asked = std::clamp(result.receive_buffer_bytes / 4 / static_cast<int>(result.max_message_bytes), 8, 512);
   receiver.max_waiting_bytes = result.history_bytes;
+  result.journal_dir = stream.journal_dir;
+  result.journal_bytes = 1'000'000LL * stream.journal_mb;
   if (!bus.run_dir.empty()) result.authenticator = std::make_shared<const Authenticator>(ReadRunSecret(bus.run_dir));
   result.camera_is_member = bus.camera_is_member;
   return result;

@@ -19,6 +19,8 @@ struct StreamSettings {
   size_t history_bytes = 0;
   int64_t heartbeat_us = 0;
   StreamReceiverOptions receiver;
+  std::string journal_dir;  // empty: no journals are kept
+  int64_t journal_bytes = 0;
   std::shared_ptr<const Authenticator> authenticator;  // null: messages are neither signed nor checked
   bool camera_is_member = true;
 

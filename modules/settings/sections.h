@@ -73,6 +73,8 @@ struct StreamTimingSettings {
   int heartbeat_ms = 0;
   int repair_ms = 0;
   int give_up_ms = 0;
+  std::string journal_dir;
+  int journal_mb = 0;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
@@ -80,6 +82,8 @@ struct StreamTimingSettings {
     field("heartbeat_ms", self.heartbeat_ms, Range{1, 10'000, "ms"});
     field("repair_ms", self.repair_ms, Range{1, 10'000, "ms"});
     field("give_up_ms", self.give_up_ms, Range{1, 1'000'000, "ms"});
+    field("journal_dir", self.journal_dir);
+    field("journal_mb", self.journal_mb, Range{1, 100'000'000, "MB"});
   }
 };
 

@@ -45,10 +45,15 @@ bool ChannelReceiver::OnMessage(const MessageHeader& header, ByteView message, i
   return receiver->OnMessage(header, message, arrival_us, now_us);
 }
 
-void ChannelReceiver::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const StreamHead& head,
-                                  int64_t now_us) {
-  if (StreamReceiver* receiver = Find(publisher, epoch_us)) {
+void ChannelReceiver::OnHeartbeat(const std::string& publisher, const StreamHead& head, int64_t now_us) {
+  if (StreamReceiver* receiver = Find(publisher, head.epoch_us)) {
     receiver->OnHeartbeat(head.first_sequence, head.next_sequence, now_us);
+  }
+}
+
+void ChannelReceiver::Replay(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us) {
+  if (StreamReceiver* receiver = Find(header.publisher, header.epoch_us)) {
+    receiver->Replay(header, message, arrival_us, now_us);
   }
 }
 

@@ -26,7 +26,10 @@ class ChannelReceiver {
 
   // False if the header makes no sense in its stream, or there are far too many publishers.
   bool OnMessage(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us);
-  void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const StreamHead& head, int64_t now_us);
+  void OnHeartbeat(const std::string& publisher, const StreamHead& head, int64_t now_us);
+
+  // A message that was delivered in an earlier life, in the order of that time. What comes next continues behind it.
+  void Replay(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us);
 
   // As in StreamReceiver, over all streams.
   std::vector<RepairRequest> Poll(int64_t now_us);

@@ -63,6 +63,7 @@ struct Layout<stream_head_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& head) {
     fields(message.channel, head.channel);
+    fields.Time(message.epoch_us, head.epoch_us);
     fields.Count(message.first_sequence, head.first_sequence);
     fields.Count(message.next_sequence, head.next_sequence);
     fields(message.is_exclusive, head.is_exclusive);

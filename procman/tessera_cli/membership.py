@@ -9,6 +9,7 @@ import hashlib
 import hmac
 import os
 import secrets
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,15 @@ class RunDir:
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
+
+    @property
+    def journals(self) -> Path:
+        """Where stages of a list keep what a successor needs (modules/runtime/journal.h)."""
+        return self.path / "journal"
+
+    def forget_journals(self) -> None:
+        """Those of another run are of no use."""
+        shutil.rmtree(self.journals, ignore_errors=True)
 
     def secret(self) -> bytes | None:
         """None if there is none."""

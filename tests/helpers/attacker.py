@@ -199,7 +199,8 @@ def add_heartbeat(stage: str, channel: str) -> None:
         message.header.epoch_us += epoch_step_us
         message.header.sequence += sequence_step
         head = tessera.stream_head_t()
-        head.channel, head.first_sequence, head.next_sequence, head.is_exclusive = channel, first, following, True
+        head.channel, head.epoch_us, head.is_exclusive = channel, message.header.epoch_us, True
+        head.first_sequence, head.next_sequence = first, following
         message.host, message.pid, message.num_streams, message.streams = "elsewhere", 1, 1, [head]
         attacker.send("HEARTBEAT", message)
 

@@ -16,7 +16,7 @@ import pytest
 
 from helpers.stack import NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera, pids_of, read_line, wait_for
 from tessera_cli.lcm_bus import LoggedEvent, read_log, write_log
-from tessera_cli.messages import receive_logged
+from tessera_cli.messages import pose_t, receive_logged
 
 # All poses of the made sequence are known exactly; the room is 14 m wide.
 MAX_RMS_ERROR_M = 0.05
@@ -153,7 +153,7 @@ def test_an_extractor_that_is_killed_changes_nothing(tessera: Tessera, sequence:
     assert summary["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
 
 
-@pytest.mark.parametrize("stage", ["camera", "dispatcher", "reassembler", "mapper", "evaluator"])
+@pytest.mark.parametrize("stage", ["camera", "dispatcher", "reassembler", "tracker", "mapper", "evaluator"])
 def test_a_stage_that_is_killed_changes_nothing(
     tessera: Tessera, sequence: Path, reference_run: Finished, stage: str
 ) -> None:
@@ -175,15 +175,70 @@ def test_a_stage_that_is_killed_changes_nothing(
         assert summary[key] == reference_run.summary[key], key
 
 
-def test_a_tracker_that_is_killed_ends_the_run(tessera: Tessera, sequence: Path) -> None:
-    port, folder = tessera.next_port(), tessera.next_folder()
-    run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
-    wait_for(lambda: pids_of(folder, "camera"), "the camera")
-    os.kill(pids_of(folder, "tracker")[0], signal.SIGKILL)
-    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
-    assert run.returncode == 1, out
-    assert "tracker was killed by SIGKILL" in out
-    assert not pids_of(folder)
+class KilledRun:
+    """A run whose stages are killed when it has so many poses. Nobody keeps more than its last messages in memory."""
+
+    def __init__(self, tessera: Tessera, sequence: Path, *options: object) -> None:
+        port, self.folder = tessera.next_port(), tessera.next_folder()
+        small = ("--set", "stream.history_bytes=2000000", "--extractors", 1)
+        self._run = tessera.start("run", f"kitti:{sequence}", *small, *options, "--port", port, "--out", self.folder)
+        self._frames: set[int] = set()
+        self._bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
+        self._bus.subscribe("POSE", self._on_pose).set_queue_capacity(1000)
+
+    def _on_pose(self, _channel: str, data: bytes) -> None:
+        self._frames.add(pose_t.decode(data).frame)
+
+    def kill(self, stage: str, num_poses: int) -> None:
+        wait_for(lambda: self._has(num_poses) and pids_of(self.folder, stage), f"{num_poses} poses and {stage}")
+        os.kill(pids_of(self.folder, stage)[0], signal.SIGKILL)
+
+    def _has(self, num_poses: int) -> bool:
+        assert self._run.poll() is None, self.end()[1]
+        self._bus.handle_timeout(20)
+        return len(self._frames) >= num_poses
+
+    def end(self) -> tuple[int, str]:
+        """The exit status, and what was printed."""
+        out, _ = self._run.communicate(timeout=RUN_TIMEOUT_S)
+        return self._run.returncode, out
+
+
+def test_stages_that_are_killed_one_after_the_other_change_nothing(
+    tessera: Tessera, sequence: Path, reference_run: Finished
+) -> None:
+    """The tracker also before it has a map, right after it was started again, and at the end."""
+    run = KilledRun(tessera, sequence)
+    kills = {"camera": 8, "loop": 12, "reassembler": 14, "mapper": 20, "global": 24, "dispatcher": 28, "evaluator": 30}
+    kills_of_tracker = [("tracker", num_poses) for num_poses in (0, 3, 16, 31, NUM_FRAMES - 10)]
+    kills_in_order = sorted([*kills.items(), *kills_of_tracker], key=lambda kill: kill[1])
+    for stage, num_poses in kills_in_order:
+        run.kill(stage, num_poses)
+    status, out = run.end()
+    assert status == 0, out
+    summary = json.loads((run.folder / "summary.json").read_text())
+    assert len(summary["warnings"]) == len(kills_in_order), out
+    for key in ("ended", "frames", "frames_tracked", "frames_dropped", "trajectory_sha256", "map_sha256"):
+        assert summary[key] == reference_run.summary[key], key
+    assert not (run.folder / "journal").exists()
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("stream.journal_mb=1", "can't continue where it was killed: its journal had been given up"),
+        ("stream.journal_dir=", "tracker was killed by SIGKILL"),
+    ],
+)
+def test_a_tracker_that_is_killed_without_its_journal_ends_the_run(
+    tessera: Tessera, sequence: Path, setting: str, sentence: str
+) -> None:
+    run = KilledRun(tessera, sequence, "--set", setting, "--pace", 0.5)
+    run.kill("tracker", NUM_FRAMES // 3)
+    status, out = run.end()
+    assert status == 1, out
+    assert sentence in out
+    assert not pids_of(run.folder)
 
 
 def test_a_mapper_of_lowest_priority_changes_nothing(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:

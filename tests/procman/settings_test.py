@@ -13,6 +13,7 @@ from tessera_cli.supervision.write_limits import RUN_FOLDER, URLS, WRITTEN
 OTHER_TEXTS = {
     "bus.channel_prefix",
     "bus.run_dir",  # a deputy puts its own in its place
+    "stream.journal_dir",  # and here
     "camera.source",
     "camera.sensor",
     "camera.calibration",

@@ -7,7 +7,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "messages/tracking_types.h"
 #include "stages/camera/camera_stage.h"
@@ -61,7 +63,8 @@ class Sequence {
   RunFolder folder_;
 };
 
-Settings SettingsOf(const RunFolder& folder, int64_t num_frames, double keyframe_min_share) {
+Settings SettingsOf(const RunFolder& folder, int64_t num_frames, double keyframe_min_share,
+                    const std::vector<std::string>& assignments) {
   static const Sequence sequence;
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("camera.source=kitti:" + sequence.path());
@@ -73,14 +76,17 @@ Settings SettingsOf(const RunFolder& folder, int64_t num_frames, double keyframe
   settings.Override("tracker.relocalize=false");  // nobody is there to answer
   settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());
+  settings.Override("stream.journal_dir=" + folder.File("journal"));
+  for (const std::string& assignment : assignments) settings.Override(assignment);
   return settings;
 }
 
 class StackRun {
  public:
   // A share of 0.9 makes many keyframes on a short way.
-  explicit StackRun(int64_t num_frames = kNumFrames, double keyframe_min_share = 0.9)
-      : bus_(SettingsOf(folder_, num_frames, keyframe_min_share)) {
+  explicit StackRun(int64_t num_frames = kNumFrames, double keyframe_min_share = 0.9,
+                    const std::vector<std::string>& assignments = {})
+      : bus_(SettingsOf(folder_, num_frames, keyframe_min_share, assignments)) {
     StageContext& probe = bus_.AddContext("probe");
     probe.Subscribe(kPose, [this](const PoseEstimate& pose) { last_pose_ = std::max(last_pose_, pose.frame); });
     probe.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) { snapshot_ = page.part.number; });
@@ -101,10 +107,13 @@ class StackRun {
     if (!bus_.RunUntil([&] { return fs::exists(folder_.File("run.json")); })) return {};
     return nlohmann::json::parse(folder_.Read("run.json"));
   }
-  template <class Stage>
-  void Restart(const std::string& name) {
+  void Kill(const std::string& name) {
     bus_.Kill(name);
     fs::remove(folder_.File("run.json"));  // which SIGKILL would not have let the evaluator write
+  }
+  template <class Stage>
+  void Restart(const std::string& name) {
+    Kill(name);
     Wait();
     bus_.Start<Stage>(name);
   }
@@ -155,13 +164,17 @@ TEST(Revival, ADispatcherGoesOnBehindWhatIsTracked) { ExpectSameAfterDeathsOf<Di
 
 TEST(Revival, ACameraGoesOnBehindWhatIsTracked) { ExpectSameAfterDeathsOf<CameraStage>("camera"); }
 
+TEST(Revival, ATrackerContinuesByItsJournal) { ExpectSameAfterDeathsOf<TrackerStage>("tracker"); }
+
+TEST(Revival, AMapperContinuesByItsJournal) { ExpectSameAfterDeathsOf<MapperStage>("mapper"); }
+
 TEST(Revival, AnEvaluatorIsToldAllAgain) { ExpectSameAfterDeathsOf<EvaluatorStage>("evaluator"); }
 
-// Poses are relative to keyframes that left the map before the snapshot that it begins with.
+// Without a journal. Poses are relative to keyframes that left the map before the snapshot that it begins with.
 TEST(Revival, AnEvaluatorIsToldWhatLeftTheMapBeforeIt) {
   const nlohmann::json expected = StackRun(kNumLongFrames, 0.999).Finish();
   ASSERT_FALSE(expected.is_null());
-  StackRun run(kNumLongFrames, 0.999);
+  StackRun run(kNumLongFrames, 0.999, {"stream.journal_dir="});
   ASSERT_TRUE(run.Reach(kNumLongFrames - 5));
   run.Restart<EvaluatorStage>("evaluator");
   const nlohmann::json figures = run.Finish();
@@ -182,6 +195,37 @@ TEST(Revival, AllStagesBeforeTheTrackerDieAtOnce) {
   run.bus().Start<ExtractorStage>("extractor_0", 0);
   run.bus().Start<CameraStage>("camera");
   ExpectSame(run.Finish());
+}
+
+// Nobody else keeps more than some frames: what is needed again is on the disk.
+TEST(Revival, AllStagesBehindTheReassemblerDieAtOnceAndAgain) {
+  StackRun run(kNumFrames, 0.9, {"stream.history_bytes=250000"});
+  for (const int64_t num_poses : {15, 30, 45}) {
+    ASSERT_TRUE(run.Reach(num_poses));
+    for (const char* name : {"tracker", "mapper", "evaluator"}) run.Kill(name);
+    run.Wait();
+    run.bus().Start<EvaluatorStage>("evaluator");
+    run.bus().Start<MapperStage>("mapper");
+    run.bus().Start<TrackerStage>("tracker");
+  }
+  ExpectSame(run.Finish());
+}
+
+// Frames that an earlier reassembler sent are nowhere else.
+TEST(Revival, TheReassemblerDiesAndThenTheTracker) {
+  StackRun run;
+  ASSERT_TRUE(run.Reach(15));
+  run.Restart<ReassemblerStage>("reassembler");
+  ASSERT_TRUE(run.Reach(30));
+  run.Restart<TrackerStage>("tracker");
+  ExpectSame(run.Finish());
+}
+
+TEST(Revival, ATrackerWhoseJournalWasGivenUpEndsWithASentence) {
+  StackRun run(kNumFrames, 0.9, {"stream.journal_mb=1"});
+  ASSERT_TRUE(run.Reach(40));
+  run.bus().Kill("tracker");
+  EXPECT_THROW(run.bus().Start<TrackerStage>("tracker"), std::runtime_error);
 }
 
 }  // namespace

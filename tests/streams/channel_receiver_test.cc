@@ -59,7 +59,8 @@ TEST(Channel, PublishersDoNotWaitForEachOther) {
   channel.OnMessage({.publisher = "extractor_0", .epoch_us = 1, .sequence = 2}, kMessage, 0, 0);
   channel.OnMessage({.publisher = "extractor_1", .epoch_us = 2, .sequence = 0}, kMessage, 0, 0);
   EXPECT_EQ(delivered, (std::vector<std::string>{"extractor_0", "extractor_1"}));
-  channel.OnHeartbeat("extractor_0", 1, {.channel = "TILE_FEATURES", .first_sequence = 0, .next_sequence = 3}, 0);
+  channel.OnHeartbeat("extractor_0",
+                      {.channel = "TILE_FEATURES", .epoch_us = 1, .first_sequence = 0, .next_sequence = 3}, 0);
   const auto requests = channel.Poll(20'000);
   ASSERT_EQ(requests.size(), 1U);
   EXPECT_EQ(requests[0],

@@ -627,7 +627,8 @@ Heartbeat DrawValue<Heartbeat>(std::mt19937& generator, int size) {
   Heartbeat heartbeat{.host = "node", .pid = Draw(generator, 1, 99999), .streams = {}};
   for (int i = 0; i < 16 * size; ++i) {
     const int first = Draw(generator, 0, 99);
-    heartbeat.streams.push_back({"TILE_" + std::to_string(i), first, first + Draw(generator, 0, 99), i % 2 == 0});
+    heartbeat.streams.push_back(
+        {"TILE_" + std::to_string(i), 1'700'000'000'000'000 + i, first, first + Draw(generator, 0, 99), i % 2 == 0});
   }
   return heartbeat;
 }

@@ -10,7 +10,8 @@
 namespace tessera {
 
 EvaluatorStage::EvaluatorStage(StageContext& context)
-    : context_(context),
+    : context_(
+          context.KeepJournal({kPose, kMapDelta, kMapSnapshot, kRemovedKeyframes, kGroundTruth, kEndOfStream}, {})),
       out_dir_(context.settings().Get<EvaluatorSettings>().out_dir),
       map_path_(context.settings().Get<EvaluatorSettings>().save_map),
       session_(context.name()),

@@ -6,7 +6,7 @@
 
 namespace tessera {
 GlobalAdjusterStage::GlobalAdjusterStage(StageContext& context)
-    : context_(context),
+    : context_(context.KeepJournal({kMapDelta, kMapSnapshot, kEndOfStream}, {kGlobalAdjustment})),
       polishes_(context.settings().Get<MapperSettings>().polish),
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); },

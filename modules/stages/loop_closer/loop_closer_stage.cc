@@ -35,7 +35,8 @@ std::shared_ptr<const Vocabulary> VocabularyFrom(const Settings& settings) {
 }  // namespace
 
 LoopCloserStage::LoopCloserStage(StageContext& context)
-    : context_(context),
+    : context_(context.KeepJournal({kMapDelta, kMapSnapshot, kRelocalizationRequest, kEndOfStream},
+                                   {kLoopResult, kRelocalization})),
       session_(VocabularyFrom(context.settings()), OptionsFrom(context.settings())),
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); },

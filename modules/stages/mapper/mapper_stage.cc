@@ -26,7 +26,8 @@ MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
 }  // namespace
 
 MapperStage::MapperStage(StageContext& context)
-    : context_(context),
+    : context_(context.KeepJournal({kKeyframe, kLoopResult, kGlobalAdjustment, kMapRequest, kEndOfStream},
+                                   {kMapDelta, kMapSnapshot, kRemovedKeyframes, kEndOfStream})),
       answering_(kAnswersPerSecond, kAnswersAtOnce),
       session_(OptionsFrom(context.settings().Get<MapperSettings>())),
       deltas_(context.Advertise(kMapDelta)),
@@ -41,8 +42,9 @@ MapperStage::MapperStage(StageContext& context)
   Receive(kKeyframe);
   Receive(kLoopResult);
   Receive(kGlobalAdjustment);
-  context.Subscribe(kMapRequest, [this](const MapRequest& request) {
-    if (answering_.Take(1, context_.now_us())) Do(session_.Receive(request));
+  context.Subscribe(kMapRequest, [this](const MapRequest& request, const MessageInfo& info) {
+    // By the time of arrival, which is the same when the journal is replayed.
+    if (answering_.Take(1, info.arrival_us)) Do(session_.Receive(request));
   });
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
     if (end.stage != StageKind::kTracker) return;

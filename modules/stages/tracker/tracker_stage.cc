@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "wire/recorded_steps.h"
@@ -41,13 +42,17 @@ TrackerSession MakeSession(const Settings& settings) {
 }  // namespace
 
 TrackerStage::TrackerStage(StageContext& context)
-    : context_(context),
+    : context_(context.KeepJournal({kFeatures, kMapDelta, kMapSnapshot, kRelocalization, kEndOfStream},
+                                   {kPose, kKeyframe, kEndOfStream})),
       session_(MakeSession(context.settings())),
       map_(
           context, BeginsWithMap(context.settings()),
           [this](const MapFollower::Delta& delta) { return session_.Receive(delta); }, [this] { Advance(); }),
       base_from_camera_(context.settings().Get<BodySettings>().BaseFromCamera()),
       watches_latency_(WatchesLatency(context.settings().Get<TrackerSettings>())) {
+  if (context.has_lost_journal()) {
+    throw std::runtime_error("it can't continue where it was killed: its journal had been given up before");
+  }
   poses_ = context.Advertise(kPose);
   keyframes_ = context.Advertise(kKeyframe);
   end_of_stream_ = context.Advertise(kEndOfStream);

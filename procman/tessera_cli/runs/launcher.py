@@ -7,6 +7,7 @@ import shutil
 import time
 from argparse import Namespace
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from tessera_cli.cluster.keys import key_folder
@@ -25,13 +26,13 @@ from tessera_cli.interrupt import Interrupt
 from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
 from tessera_cli.runs.ports import PortLock, take_free_port
-from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, require_no_run
+from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, remove_journals, require_no_run
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, is_trustworthy, occupancy_warnings, write_summary
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
-from tessera_cli.supervision.process_list import read_process_list
+from tessera_cli.supervision.process_list import Process, read_process_list
 from tessera_cli.supervision.silence import SilenceWatch
 from tessera_cli.supervision.stack_monitor import StackMonitor, hear_heartbeats, is_of_this_machine
 from tessera_cli.supervision.state_folder import LogFolder
@@ -39,8 +40,8 @@ from tessera_cli.versions import tessera_version
 
 PROCESS_LIST = PROCMAN / "local.pmd"
 BUSY_BUS = "another stack runs on this bus: end it, or give --port N to keep the two apart."
-# Stages whose long steps frames may have to wait for.
-MAP_STAGES = ("mapper", "loop_closer", "global_adjuster")
+# Stages whose long steps, or journals when they were killed, frames may have to wait for.
+MAP_STAGES = ("tracker", "mapper", "loop_closer", "global_adjuster")
 
 
 def run_stack(arguments: Namespace, present: Present) -> int:
@@ -90,10 +91,20 @@ def _make_launcher(
         require_no_run(folder)
     remove_earlier_run(folder)
     values = write_settings(assignments, folder / "settings.yaml")
+    remove_journals(values)
+    cleanup.callback(remove_journals, values)
     if run_dir := _take_bus(arguments, source, values):
         cleanup.callback(run_dir.end)
-    deputy = PrivateDeputy(logs, folder / "settings.yaml", process_list.processes.values())
+    processes = [_without_journal(process, values) for process in process_list.processes.values()]
+    deputy = PrivateDeputy(logs, folder / "settings.yaml", processes)
     return Launcher(arguments, source, folder, values, deputy, present)
+
+
+def _without_journal(process: Process, values: Settings) -> Process:
+    """A tracker that keeps no journal can't continue, and nobody can replace it."""
+    if process.command != "tracker" or values["stream"]["journal_dir"]:
+        return process
+    return replace(process, options=replace(process.options, auto_respawn="never"))
 
 
 def _take_bus(arguments: Namespace, source: Source, values: Settings) -> RunDir | None:

@@ -85,6 +85,17 @@ def remove_earlier_run(folder: Path) -> None:
         log.unlink()
 
 
+def remove_journals(values: Settings) -> None:
+    """What stages with these settings kept for their successors (modules/runtime/journal.h)."""
+    if not values["stream"]["journal_dir"]:
+        return
+    folder = Path(values["stream"]["journal_dir"])
+    for journal in folder.glob("*.journal*"):
+        journal.unlink()
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
 @dataclass(frozen=True)
 class Frames:
     """frames.csv, n rows in order of the frames' numbers. What is unknown is NaN."""

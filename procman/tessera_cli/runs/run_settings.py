@@ -51,6 +51,7 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
     assignments = source_assignments(arguments, source) + _bus_assignments(source, arguments.port)
     run_dir = run_dir_of(key_folder(), bus_url(arguments.port), arguments.prefix)
     assignments += [f"bus.run_dir={run_dir.path}", f"bus.camera_is_member={str(source.has_camera_process).lower()}"]
+    assignments.append(f"stream.journal_dir={out_dir / 'journal'}")
     assignments += _time_assignments(arguments, source)
     assignments += [f"dispatcher.tiles={arguments.tiles}", f"evaluator.out_dir={out_dir}"]
     if arguments.prefix:

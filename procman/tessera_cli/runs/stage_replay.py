@@ -134,6 +134,7 @@ def _assignments(arguments: Namespace, log: Path, url: str) -> list[str]:
         *(f"bus.{key}={url}" for key in BUS_KEYS),
         f"bus.channel_prefix={arguments.prefix}",
         "bus.run_dir=",
+        "stream.journal_dir=",
         f"tracker.replay_log={log}",
         *user_assignments(arguments),
     ]

@@ -188,13 +188,13 @@ class Deputy:
                 continue
             say(f"resuming the last order of {order.list}: {', '.join(wish.name for wish in order.wishes)}")
             try:
-                self._obey(order)
+                self._obey(order, is_resumed=True)
             except (UserError, RunError, OSError) as error:
                 say(visible(f"order refused: {error}"))
 
-    def _obey(self, order: procman_order_t) -> None:
+    def _obey(self, order: procman_order_t, is_resumed: bool = False) -> None:
         if order.action == procman_order_t.RUN:
-            self._obey_run(order)
+            self._obey_run(order, is_resumed)
         elif order.process not in self._supervisor.names:
             known = ", ".join(self._supervisor.names) or "none"
             raise UserError(f"the deputy {self._id} has no process '{order.process}'; it has: {known}.")
@@ -207,8 +207,11 @@ class Deputy:
         else:
             raise UserError(f"there is no action {order.action}.")
 
-    def _obey_run(self, order: procman_order_t) -> None:
-        """All or nothing: a list with one bad wish changes nothing."""
+    def _obey_run(self, order: procman_order_t, is_resumed: bool) -> None:
+        """All or nothing: a list with one bad wish changes nothing.
+
+        Stages of a list that is resumed continue by the journals that they kept under an earlier deputy.
+        """
         if not order.wishes:
             self._end(order.list, order.session)
             return
@@ -222,6 +225,8 @@ class Deputy:
         launches = self._launches(order, run)
         if order.list not in self._lists or run != self._lists[order.list].run:
             self._begin(order, run, secret)
+            if not is_resumed:
+                self._folder.run_dir(order.list).forget_journals()
         self._forget_ended(order.list)
         self._supervisor.set_wanted(launches, order.session, full_name(order.list, ""))
 
@@ -246,7 +251,11 @@ class Deputy:
 
     def _begin(self, order: procman_order_t, run: str, secret: bytes | None) -> None:
         run_dir = self._folder.run_dir(order.list)
-        assignments = [*order.settings, f"bus.run_dir={run_dir.path if secret else ''}"]
+        assignments = [
+            *order.settings,
+            f"bus.run_dir={run_dir.path if secret else ''}",
+            f"stream.journal_dir={run_dir.journals}",
+        ]
         merged = settings.write_settings(assignments, self._folder.settings_path(run))
         refuse_writing_elsewhere(merged, [path for command in self._commands.values() for path in command.writes])
         if secret:
@@ -265,6 +274,7 @@ class Deputy:
         for name in list(self._lists):
             if list_name in ("", name):
                 self._supervisor.set_wanted({}, session, full_name(name, ""))
+                self._folder.run_dir(name).forget_journals()
         self._folder.forget_orders(list_name)
 
     def _forget_ended(self, ordered: str) -> None:

@@ -139,10 +139,10 @@ def test_it_comes_back_when_deputies_die_and_a_cable_is_pulled(
     must_equal(tmp_path / "out", reference_run)
 
 
-def test_the_node_of_the_camera_dies_and_the_run_begins_anew(
+def test_the_node_of_the_camera_dies_and_the_run_continues_when_it_is_back(
     make_node: MakeNode, lan: Lan, sequence: Path, reference_run: Finished, tmp_path: Path
 ) -> None:
-    """Nobody else has what its tracker knew; the extractors on the other nodes go on."""
+    """What its tracker knew is on its disk; the extractors on the other nodes go on."""
     nodes = make_nodes(make_node, lan)
     line = run_script(nodes[1], "lan.pmd", sequence, tmp_path / "out", "--set", "camera.pace=0.5")
     script = nodes[1].start_command(*line)
@@ -154,6 +154,7 @@ def test_the_node_of_the_camera_dies_and_the_run_begins_anew(
         nodes[0].start()
         wait_for(lambda: len(nodes[0].marked()) == len(STAGES), "the camera again")
         assert nodes[1].marked() == extractors
+        assert "continues where it was when it was killed" in nodes[0].command("log", "tracker").stdout
         must_succeed(script)
     finally:
         script.kill()

@@ -1,0 +1,147 @@
+#include "runtime/journal.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+#include <utility>
+
+#include "core/crc32.h"
+#include "core/errors.h"
+
+namespace tessera {
+namespace {
+
+// The first entry stands in place of a channel's message.
+constexpr std::string_view kTitle = "tessera journal 1";
+constexpr std::string_view kLostTitle = "tessera journal 1, given up";
+
+// In front of an entry; in the byte order of the machine, which alone reads it.
+struct Head {
+  uint32_t num_bytes = 0;  // of what follows
+  uint32_t checksum = 0;   // of it
+  // What follows: arrival time, length of the channel's name (1 byte), the name, the message.
+};
+constexpr size_t kMinBytes = sizeof(int64_t) + 1;
+
+Bytes Encode(const std::string& channel, ByteView message, int64_t arrival_us) {
+  Bytes bytes(sizeof(Head) + kMinBytes + channel.size() + message.size());
+  uint8_t* at = bytes.data() + sizeof(Head);
+  std::memcpy(at, &arrival_us, sizeof(arrival_us));
+  at[sizeof(arrival_us)] = static_cast<uint8_t>(channel.size());
+  at += kMinBytes;
+  at = std::copy(channel.begin(), channel.end(), at);
+  std::copy(message.begin(), message.end(), at);
+  const ByteView content = ByteView(bytes).subspan(sizeof(Head));
+  const Head head{static_cast<uint32_t>(content.size()), Crc32(content)};
+  std::memcpy(bytes.data(), &head, sizeof(head));
+  return bytes;
+}
+
+std::optional<Journal::Entry> Decode(ByteView content) {
+  if (content.size() < kMinBytes || content.size() < kMinBytes + content[kMinBytes - 1]) return std::nullopt;
+  Journal::Entry entry;
+  std::memcpy(&entry.arrival_us, content.data(), sizeof(entry.arrival_us));
+  const ByteView name = content.subspan(kMinBytes, content[kMinBytes - 1]);
+  const ByteView message = content.subspan(kMinBytes + name.size());
+  entry.channel.assign(name.begin(), name.end());
+  entry.message.assign(message.begin(), message.end());
+  return entry;
+}
+
+bool WriteAll(int file, const Bytes& bytes) {
+  return write(file, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+}
+
+[[noreturn]] void ThrowUnusable(const std::string& path) {
+  throw InputError("the journal " + path + " can't be used (" + std::strerror(errno) +
+                   "): check the folder and the room on the disk, or do without by stream.journal_dir=\"\": a killed "
+                   "tracker ends the run then");
+}
+
+}  // namespace
+
+Journal::Journal(std::string path, int64_t epoch_us, int64_t max_bytes)
+    : path_(std::move(path)), max_bytes_(max_bytes), epoch_us_(epoch_us) {
+  std::error_code ignored;
+  std::filesystem::create_directories(std::filesystem::path(path_).parent_path(), ignored);
+  reader_.reset(std::fopen(path_.c_str(), "rbe"));
+  if (!reader_) {
+    if (errno != ENOENT) ThrowUnusable(path_);
+    Begin(epoch_us);
+  }
+  file_ = open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (file_ < 0) ThrowUnusable(path_);
+  if (!reader_) return;
+  std::fseek(reader_.get(), 0, SEEK_END);
+  size_ = std::ftell(reader_.get());
+  std::rewind(reader_.get());
+  const std::optional<Entry> title = Read();
+  is_lost_ = !title || title->channel != kTitle;
+  if (is_lost_) reader_.reset();
+  if (!is_lost_) epoch_us_ = title->arrival_us;
+}
+
+Journal::~Journal() {
+  if (file_ >= 0) close(file_);
+}
+
+// Beside, then renamed: a journal without its title is one that was given up.
+void Journal::Begin(int64_t epoch_us) {
+  const std::string part = path_ + ".part";
+  const int file = open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file < 0) ThrowUnusable(part);
+  const Bytes title = Encode(std::string(kTitle), {}, epoch_us);
+  const bool is_written = WriteAll(file, title);
+  close(file);
+  if (!is_written || std::rename(part.c_str(), path_.c_str()) != 0) ThrowUnusable(path_);
+  num_bytes_ = static_cast<int64_t>(title.size());
+}
+
+// nullopt at the end, or where an entry is not whole.
+std::optional<Journal::Entry> Journal::Read() {
+  Head head;
+  if (std::fread(&head, sizeof(head), 1, reader_.get()) != 1) return std::nullopt;
+  if (head.num_bytes > size_ - std::ftell(reader_.get())) return std::nullopt;
+  Bytes content(head.num_bytes);
+  if (std::fread(content.data(), 1, content.size(), reader_.get()) != content.size() ||
+      Crc32(content) != head.checksum) {
+    return std::nullopt;
+  }
+  std::optional<Entry> entry = Decode(content);
+  if (entry) num_bytes_ += static_cast<int64_t>(sizeof(head) + content.size());
+  return entry;
+}
+
+std::optional<Journal::Entry> Journal::Next() {
+  if (!reader_) return std::nullopt;
+  std::optional<Entry> entry = Read();
+  if (entry) return entry;
+  reader_.reset();
+  if (ftruncate(file_, num_bytes_) != 0) ThrowUnusable(path_);
+  return std::nullopt;
+}
+
+Result<> Journal::Append(const std::string& channel, ByteView message, int64_t arrival_us) {
+  if (is_lost_) return {};
+  const Bytes bytes = Encode(channel, message, arrival_us);
+  num_bytes_ += static_cast<int64_t>(bytes.size());
+  if (num_bytes_ > max_bytes_) return GiveUp("it would be larger than stream.journal_mb");
+  if (!WriteAll(file_, bytes)) return GiveUp(std::strerror(errno));
+  return {};
+}
+
+// Its room is given back: others may need it more.
+Result<> Journal::GiveUp(const std::string& why) {
+  is_lost_ = true;
+  // An empty file says the same as this title.
+  if (ftruncate(file_, 0) == 0) WriteAll(file_, Encode(std::string(kLostTitle), {}, epoch_us_));
+  return Failed("the journal " + path_ + " is given up (" + why +
+                "): this process may not come back if it is killed from now on");
+}
+
+}  // namespace tessera
