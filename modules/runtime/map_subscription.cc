@@ -25,7 +25,7 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply a
     ApplyAll();
   });
   context.Every(kAskAgain, [this] {
-    asked_.reset();
+    follower_.ForgetRequest();
     Ask();
   });
 }
@@ -58,11 +58,8 @@ void MapSubscription::Reject(const std::string& reason) {
   context_.ReportError("the map can't be followed, and is asked for anew: " + reason);
 }
 
-// Each request once, until the next one or the timer: an answer is on its way.
 void MapSubscription::Ask() {
-  const std::optional<MapRequest> request = follower_.Request();
-  if (request && request != asked_) requests_.Publish(*request);
-  asked_ = request;
+  if (const std::optional<MapRequest> request = follower_.TakeRequest()) requests_.Publish(*request);
 }
 
 }  // namespace tessera
