@@ -34,7 +34,8 @@ MapArchive::Answer MapArchive::AnswerTo(const MapRequest& request, const Map& ma
     return answer;
   }
   for (const auto& delta : deltas_) {
-    if (delta->number >= request.next_delta && answer.deltas.size() < kMaxDeltas) answer.deltas.push_back(delta);
+    if (delta->number < request.next_delta || delta->number >= request.next_delta + MapRequest::kMaxDeltas) continue;
+    answer.deltas.push_back(delta);
   }
   return answer;
 }

@@ -33,8 +33,6 @@ class MapArchive {
   // A snapshot is taken of the first delta, and then this often, in deltas. The one handed out is of the beginning, or
   // between one and two such intervals old, or else the last before the awaited delta.
   static constexpr int64_t kSnapshotInterval = 48;
-  // Deltas sent for one request; who lacks more asks again.
-  static constexpr size_t kMaxDeltas = 16;
 
  private:
   std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest snapshot, or all

@@ -14,6 +14,9 @@ struct MapRequest {
   int64_t snapshot = -1;    // a page of the snapshot with this number is asked for; -1: whatever leads on
   int32_t page = 0;
 
+  // Sent for one request; who lacks more asks again.
+  static constexpr int64_t kMaxDeltas = 16;
+
   bool operator==(const MapRequest&) const = default;
 };
 

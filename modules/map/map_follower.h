@@ -34,6 +34,10 @@ class MapFollower {
 
   // What to ask the owner for; nullopt: nothing is known to be missing.
   std::optional<MapRequest> Request() const;
+  // The same if it is to be sent now; nullopt also while the answer to an earlier one may be on its way.
+  std::optional<MapRequest> TakeRequest();
+  // No answer has come for long: what is missing is asked for again.
+  void ForgetRequest() { asked_.reset(); }
   // Whether the replica waits for a snapshot after Reject().
   bool needs_snapshot() const { return needs_snapshot_; }
   // Number of the delta that Take() will give next.
@@ -46,6 +50,7 @@ class MapFollower {
     MapDelta whole;
   };
   void Complete();
+  bool IsAnsweredSoon(const MapRequest& request) const;
 
   // Deltas kept behind a gap; more are dropped, and asked for when the gap is closed.
   static constexpr size_t kMaxWaiting = 256;
@@ -56,6 +61,7 @@ class MapFollower {
   int64_t num_known_ = 0;             // at least so many exist
   std::map<int64_t, Delta> waiting_;  // by number
   std::optional<Collected> collected_;
+  std::optional<MapRequest> asked_;
   Delta snapshot_;  // complete, and not yet taken
 };
 

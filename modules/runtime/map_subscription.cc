@@ -4,22 +4,12 @@
 #include <memory>
 #include <utility>
 
-#include "map/map_archive.h"
-
 namespace tessera {
 namespace {
 
 // The owner may be in the middle of a bundle adjustment, and an answer is some messages: asking more often helps
 // nobody.
 constexpr std::chrono::milliseconds kAskAgain{300};
-
-// Whether the answer to `asked` brings what `request` asks for. It may be several deltas, of which some have come.
-bool IsOnTheWay(const MapRequest& asked, const MapRequest& request) {
-  if (asked == request) return true;
-  const bool ask_for_deltas = asked.next_delta >= 0 && asked.snapshot < 0 && request.snapshot < 0;
-  return ask_for_deltas && request.next_delta > asked.next_delta &&
-         request.next_delta < asked.next_delta + static_cast<int64_t>(MapArchive::kMaxDeltas);
-}
 
 }  // namespace
 
@@ -35,7 +25,7 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply a
     ApplyAll();
   });
   context.Every(kAskAgain, [this] {
-    asked_.reset();
+    follower_.ForgetRequest();
     Ask();
   });
 }
@@ -68,12 +58,8 @@ void MapSubscription::Reject(const std::string& reason) {
   context_.ReportError("the map can't be followed, and is asked for anew: " + reason);
 }
 
-// Each request once, until the timer.
 void MapSubscription::Ask() {
-  const std::optional<MapRequest> request = follower_.Request();
-  if (request && asked_ && IsOnTheWay(*asked_, *request)) return;
-  if (request) requests_.Publish(*request);
-  asked_ = request;
+  if (const std::optional<MapRequest> request = follower_.TakeRequest()) requests_.Publish(*request);
 }
 
 }  // namespace tessera

@@ -45,7 +45,6 @@ class MapSubscription {
   std::function<void()> on_news_;
   MapFollower follower_;
   Publisher<MapRequest> requests_;
-  std::optional<MapRequest> asked_;
   std::optional<EndOfStream> mapper_end_;
   int64_t num_rejected_ = 0;
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <deque>
 #include <random>
 
 #include "map/map_archive.h"
@@ -161,7 +162,7 @@ TEST(MapFollower, WhoComesLateToAYoungMapGetsItsDeltas) {
   for (int i = 0; i < 40; ++i) owner.Next();
   owner.Answer(*follower.Request(), follower);
   EXPECT_THAT(Update(follower, replica), IsSuccess());
-  EXPECT_EQ(replica.next_delta(), static_cast<int64_t>(MapArchive::kMaxDeltas));
+  EXPECT_EQ(replica.next_delta(), MapRequest::kMaxDeltas);
   follower.Expect(40);
   while (follower.Request()) {
     owner.Answer(*follower.Request(), follower);
@@ -169,6 +170,40 @@ TEST(MapFollower, WhoComesLateToAYoungMapGetsItsDeltas) {
   }
   EXPECT_EQ(owner.num_pages(), 0);
   ExpectEqual(replica, owner.map());
+}
+
+// The owner goes on while a late follower catches up, and every delta is heard the moment it is sent.
+TEST(MapFollower, AsksOnceForAllDeltasOfAnAnswer) {
+  Owner owner(13);
+  std::deque<MapFollower::Delta> on_their_way;
+  for (int i = 0; i < 40; ++i) owner.Next();
+  MapFollower follower(true);
+  Map replica;
+  int num_requests = 0, num_sent = 0;
+  for (int round = 0; round < 1000 && (round < 30 || !on_their_way.empty()); ++round) {
+    if (const auto request = follower.TakeRequest()) {
+      ++num_requests;
+      for (const auto& delta : owner.AnswerTo(*request).deltas) on_their_way.push_back(delta);
+    }
+    if (round % 5 == 0 && round < 30) on_their_way.push_back(owner.Next());
+    if (on_their_way.empty()) continue;
+    ++num_sent;
+    follower.Receive(on_their_way.front());
+    on_their_way.pop_front();
+    EXPECT_THAT(Update(follower, replica), IsSuccess());
+  }
+  ExpectEqual(replica, owner.map());
+  EXPECT_LE(num_requests, 5);
+  EXPECT_LE(num_sent, 80) << "46 deltas were made";
+}
+
+TEST(MapFollower, AsksAgainIfNoAnswerComes) {
+  MapFollower follower(true);
+  const auto request = follower.TakeRequest();
+  ASSERT_TRUE(request.has_value());
+  EXPECT_FALSE(follower.TakeRequest());
+  follower.ForgetRequest();
+  EXPECT_EQ(follower.TakeRequest(), request);
 }
 
 TEST(MapFollower, AWrongHashIsFoundAndMendedByASnapshot) {

@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 
-from tessera_cli.cli.options import add_extractors, add_frames, add_port
+from tessera_cli.cli.options import add_extractors, add_frames, add_port, add_settings
 from tessera_cli.cli.parsing import (
     Commands,
     Parser,
@@ -12,6 +12,7 @@ from tessera_cli.cli.parsing import (
     tiles,
     whole_number,
 )
+from tessera_cli.experiments.faults.schedule import KINDS, PROCESSES
 from tessera_cli.files import ROOT
 
 PERFORMANCE = """\
@@ -44,6 +45,22 @@ examples:
   sudo procman/tessera experiment {name} kitti:DIR --frames 0:300 --out logs/{name}
   sudo procman/tessera experiment {name} stereo=sim:street --extractors 1 4 --tiles 1x1 2x2 --repetitions 1 --no-faults
 """
+FAULTS = """\
+One run is left alone; in all others faults are thrown, one after the other, as the seed shuffles them: a process gets
+SIGKILL, or SIGSTOP for some seconds; an extractor gets a tenth of a core for some seconds; 2 % of all packets are lost
+for some seconds. The next fault comes when there are poses again. Every run must end with the trajectory and the map
+of the undisturbed one. Slow nodes and lost packets need root: the runs have a network of their own then.
+
+The folder holds each run, the table as faults.json, each fault in faults.csv, and faults.html. An experiment that was
+interrupted continues where it stopped when the same command is given again with its --out; more faults are added.
+
+Exit status: 0 all runs ended like the undisturbed one; 1 one did not; 2 the arguments are wrong.
+
+examples:
+  sudo procman/tessera experiment faults kitti:DIR --minutes 30 --faults 200
+  sudo procman/tessera experiment faults stereo=sim:street-short --faults 20 --seed 3
+  procman/tessera experiment faults sim:street-short --kinds kill --processes mapper loop_closer
+"""
 COMPARE = """\
 examples:
   procman/tessera experiment compare logs/homogeneous logs/heterogeneous --out comparison.html
@@ -67,6 +84,7 @@ def add_parser(commands: Commands) -> None:
     _add_performance(experiments)
     for name, summary in DISTRIBUTIONS.items():
         _add_distribution(experiments, name, summary)
+    _add_faults(experiments)
     compare = add_command(
         experiments, "compare", _compare, "Two of these three experiments beside each other.", COMPARE
     )
@@ -151,6 +169,37 @@ def _add_distribution(experiments: Commands, name: str, summary: str) -> None:
     add_port(parser)
 
 
+def _add_faults(experiments: Commands) -> None:
+    summary = "Processes killed and stopped, slow nodes and lost packets: every run ends with the same map."
+    parser = add_command(experiments, "faults", _faults, summary, FAULTS)
+    parser.add_argument("source", metavar="SOURCE", type=sensor_and_source, help="[mono|stereo|rgbd=]SOURCE")
+    parser.add_argument(
+        "--minutes",
+        type=whole_number(1, 10_000),
+        metavar="N",
+        default=60,
+        help="no fault is thrown after so many minutes, default 60",
+    )
+    parser.add_argument(
+        "--faults",
+        type=whole_number(1, 100_000),
+        metavar="N",
+        default=100,
+        help="that are thrown in all runs together, default 100",
+    )
+    parser.add_argument("--seed", type=whole_number(0, 999_999_999), metavar="S", default=1, help="default 1")
+    parser.add_argument("--kinds", choices=KINDS, nargs="+", default=list(KINDS), help="of faults, default all")
+    parser.add_argument(
+        "--processes", choices=PROCESSES, nargs="+", default=list(PROCESSES), help="that they hit, default all"
+    )
+    add_frames(parser, ", for a quick check")
+    add_extractors(parser, 1)
+    add_settings(parser)
+    parser.add_argument("--out", metavar="DIR", help="default logs/<date-time>-experiment-faults")
+    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
+    add_port(parser)
+
+
 def _add_data(parser: Parser) -> None:
     data = ROOT.parent / "shared" / "data"
     parser.add_argument(
@@ -169,6 +218,12 @@ def _compare(arguments: Namespace) -> int:
     from tessera_cli.experiments.distribution.experiment import compare_distributions
 
     return compare_distributions(arguments)
+
+
+def _faults(arguments: Namespace) -> int:
+    from tessera_cli.experiments.faults.experiment import measure_faults
+
+    return measure_faults(arguments)
 
 
 def _performance(arguments: Namespace) -> int:

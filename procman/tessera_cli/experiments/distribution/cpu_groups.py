@@ -77,6 +77,13 @@ class CpuGroups:
                 (self.group(number) / "cpu.cfs_period_us").write_text(str(period_us))
                 (self.group(number) / "cpu.cfs_quota_us").write_text(str(quota_us))
 
+    def join(self, number: int, pid: int) -> None:
+        """A process that runs already; one that has just ended joins nothing."""
+        try:
+            (self.group(number) / "cgroup.procs").write_text(str(pid))
+        except ProcessLookupError:
+            pass
+
     def words(self, group_of: str) -> list[str]:
         """What stands before a command that is to join a group. `group_of`: its number, or what stands for it."""
         return ["sh", "-c", 'echo $$ >"$0" && exec "$@"', f"{self.folder}/node{group_of}/cgroup.procs"]

@@ -86,10 +86,8 @@ class Lan:
 
     def lose(self, percent: int) -> None:
         """From now on, each host loses so much of what it receives, at random. 0: nothing. Needs nft."""
-        rule = f"add rule inet loss input meta l4proto udp numgen random mod 100 < {percent} drop"
-        chain = "add table inet loss; add chain inet loss input { type filter hook input priority 0; }"
         for host in self._rates:
-            _run(*self.at(host), "nft", f"{chain}; flush chain inet loss input" + (f"; {rule}" if percent else ""))
+            run_tool(*self.at(host), "nft", loss_rules(percent))
 
     def traffic(self, host: int) -> Traffic:
         """Since the LAN was made. On a LAN of one host, which has no link: what its processes sent to each other."""
@@ -133,8 +131,8 @@ class Lan:
         ip("-n", space, "route", "add", "224.0.0.0/4", "dev", DEVICE)
         if rate_mbit is not None:
             shape = ("root", "tbf", "rate", f"{rate_mbit}mbit", "burst", BURST_BYTES, "limit", QUEUE_BYTES)
-            _run("tc", "-n", space, "qdisc", "add", "dev", DEVICE, *shape)
-            _run("tc", "-n", self._switch, "qdisc", "add", "dev", port, *shape)
+            run_tool("tc", "-n", space, "qdisc", "add", "dev", DEVICE, *shape)
+            run_tool("tc", "-n", self._switch, "qdisc", "add", "dev", port, *shape)
 
 
 def remove_stale() -> None:
@@ -180,11 +178,18 @@ def _port(host: int) -> str:
     return f"port{host}"
 
 
+def loss_rules(percent: int) -> str:
+    """What nft is to do so that a network loses so much of what arrives, at random; 0: nothing any more."""
+    rule = f"; add rule inet loss input meta l4proto udp numgen random mod 100 < {percent} drop" if percent else ""
+    chain = "add table inet loss; add chain inet loss input { type filter hook input priority 0; }"
+    return f"{chain}; flush chain inet loss input{rule}"
+
+
 def ip(*words: object) -> str:
-    return _run("ip", *words)
+    return run_tool("ip", *words)
 
 
-def _run(*words: object) -> str:
+def run_tool(*words: object) -> str:
     """Its output. Raises RunError with what it said."""
     finished = subprocess.run([str(word) for word in words], capture_output=True, text=True)
     if finished.returncode != 0:
