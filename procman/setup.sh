@@ -171,6 +171,7 @@ follow_ninja() {
     printf '%s\n' "$line" >>"$setup_log"
     [[ "$line" =~ ^\[([0-9]+)/([0-9]+)\] ]] || continue
     local done_count=${BASH_REMATCH[1]} total=${BASH_REMATCH[2]}
+    [ "$done_count" -gt 0 ] || continue  # it looks for new sources
     if [ -t 2 ]; then
       printf '\rtessera: Building: step %s of %s ' "$done_count" "$total" >&2
       told=1

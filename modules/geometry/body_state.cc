@@ -1,7 +1,6 @@
 #include "geometry/body_state.h"
 
 namespace tessera {
-namespace {
 
 Matrix6d AdjointOf(const Rigid3& transform) {
   const Eigen::Matrix3d rotation = transform.rotation.toRotationMatrix();
@@ -14,8 +13,6 @@ Matrix6d AdjointOf(const Rigid3& transform) {
   adjoint.bottomRightCorner<3, 3>() = rotation;
   return adjoint;
 }
-
-}  // namespace
 
 Rigid3 PoseOfBase(const Rigid3& world_from_camera, const Rigid3& base_from_camera) {
   return base_from_camera * world_from_camera * base_from_camera.Inverse();

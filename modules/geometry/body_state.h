@@ -21,17 +21,23 @@ struct BodyMotion {
 struct BodyState {
   Rigid3 world_from_base;
   // Of delta = (translation, rotation [rad]) in the base's axes, with true world_from_base = world_from_base *
-  // Exp(delta). Against the landmarks around: what they have drifted is not in it.
+  // Exp(delta). Against the reference keyframe of the frame (for a keyframe: the one before it): what the map has
+  // drifted until there is not in it, nor, in mono, the error of the scale.
   Matrix6d covariance = Matrix6d::Zero();
   BodyMotion motion = {};
   bool has_covariance = false;
   bool has_motion = false;
 };
 
+// Ad: with A = `transform`,  A Exp(delta) A^-1 = Exp(Ad delta)  for delta = (translation, rotation).
+//
+//   Ad = [R, [t]x R; 0, R]
+Matrix6d AdjointOf(const Rigid3& transform);
+
 // Of a camera taken as a body of its own, what it says of the base that carries it:
 //
-//   Ad = [R, [t]x R; 0, R]    (R, t: base_from_camera; acts on (translation, rotation))
-//   covariance = Ad covariance_camera Ad',   (velocity, turn_rate) = Ad (velocity, turn_rate)_camera
+//   Ad: of base_from_camera,  covariance = Ad covariance_camera Ad',   (velocity, turn_rate) = Ad (velocity,
+//   turn_rate)_camera
 BodyState StateOfBase(const BodyState& camera, const Rigid3& base_from_camera);
 // The pose alone.
 Rigid3 PoseOfBase(const Rigid3& world_from_camera, const Rigid3& base_from_camera);

@@ -1,6 +1,5 @@
 #include "geometry/pose_optimization.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <optional>
 
@@ -10,20 +9,8 @@ namespace tessera {
 namespace {
 
 constexpr int kMinInliers = 3;  // points that fix six degrees of freedom
-// Rounds of sorting lose the twentieth of good observations that chi-square calls wrong, and those that are left look
-// better than they are: 0.95 of the observations with 0.80 of their variance, in the limit of many rounds.
-constexpr double kVarianceLostBySorting = 0.95 / 0.80;
 
 }  // namespace
-
-// Retract() moves camera_from_world from the left by delta, so world_from_camera from the right by -delta.
-std::optional<Matrix6d> PoseCovariance(const Matrix6d& information) {
-  const Eigen::LLT<Matrix6d> factor(information);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const Matrix6d covariance = factor.solve(Matrix6d::Identity());
-  if (!covariance.allFinite()) return std::nullopt;
-  return 0.5 * kVarianceLostBySorting * (covariance + covariance.transpose());
-}
 
 Eigen::Matrix3d TranslationCovariance(const Eigen::Matrix<double, 6, 6>& information) {
   // Schur's complement of the rotation.

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "geometry/body_state.h"
 #include "geometry/camera.h"
 #include "geometry/reprojection.h"
 #include "geometry/rigid3.h"
@@ -47,9 +46,6 @@ struct PoseOptimizationResult {
       Eigen::Matrix<double, 6, 6>::Zero();  // of Retract's tangent, prior included
 };
 
-// Of delta in  world_from_camera * Exp(delta), (translation, rotation) in the camera's axes: the inverse, enlarged by
-// what the sorting into inliers and outliers has taken from it. nullopt: the information has no inverse.
-std::optional<Matrix6d> PoseCovariance(const Matrix6d& information);
 // Of the camera's center in its own axes, m^2: the part of the inverse that belongs to the translation.
 Eigen::Matrix3d TranslationCovariance(const Eigen::Matrix<double, 6, 6>& information);
 

@@ -10,6 +10,7 @@
 #include "measurement/landmark_description.h"
 #include "tracking/local_points.h"
 #include "tracking/pair_points.h"
+#include "tracking/pose_covariance.h"
 
 namespace tessera {
 namespace {
@@ -406,6 +407,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
   reference_ = answer.reference;
   reference_frame_.reset();
+  reference_covariance_.reset();
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
   ResetMotion();
@@ -430,8 +432,19 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
   LearnReadout(frame);
   lost_since_us_.reset();
+  const std::optional<Matrix6d> own_covariance = PoseCovariance(replica_.map(), frame);
+  const std::optional<Matrix6d> pose_covariance = CovarianceFromReference(frame, own_covariance);
   last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, is_wide_step,
-                     PoseCovariance(pose.optimized.information)});
+                     own_covariance, pose_covariance});
+}
+
+// Both ends of the way are as uncertain as their own frames' points leave them.
+std::optional<Matrix6d> MapTracker::CovarianceFromReference(const TrackedFrame& frame,
+                                                            const std::optional<Matrix6d>& own) {
+  if (!own) return std::nullopt;
+  if (!reference_covariance_) reference_covariance_ = own;
+  const Matrix6d adjoint = AdjointOf(frame.world_from_camera.Inverse() * WorldFromReference().Pose());
+  return *own + adjoint * *reference_covariance_ * adjoint.transpose();
 }
 
 void MapTracker::LearnReadout(const TrackedFrame& frame) {
@@ -529,6 +542,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
+  reference_covariance_ = last_ && &last_->frame == &frame ? last_->own_covariance : std::nullopt;
   if (frame.view->baseline_m() == 0.0) reference_frame_ = frame;
   camera_motion_at_reference_ = camera_motion_;
   ++next_keyframe_.value;

@@ -1,6 +1,8 @@
 #include "benchmarks/offline_run.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <memory>
@@ -157,6 +159,81 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
     }
   }
   mapping.Finish();
+}
+
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+// e' C^-1 e; with a direction along which e is free, at its least.
+double Nees(const Vector6d& e, const Matrix6d& covariance, const std::optional<Eigen::Vector3d>& free_direction) {
+  const Eigen::LDLT<Matrix6d> factor(covariance);
+  const double all = e.dot(factor.solve(e));
+  if (!free_direction) return all;
+  Vector6d free = Vector6d::Zero();
+  free.head<3>() = *free_direction;
+  const Vector6d weighted = factor.solve(free);
+  return all - e.dot(weighted) * e.dot(weighted) / free.dot(weighted);
+}
+
+// The camera's velocity in its own axes: the mean of those over the steps before and after.
+std::optional<Eigen::Vector3d> TrueVelocity(const std::map<FrameId, GroundTruthPose>& truth, FrameId frame) {
+  const auto before = truth.find({frame.value - 1}), at = truth.find(frame), after = truth.find({frame.value + 1});
+  if (before == truth.end() || at == truth.end() || after == truth.end()) return std::nullopt;
+  const auto per_s = [](const GroundTruthPose& from, const GroundTruthPose& to) -> Eigen::Vector3d {
+    return (to.world_from_camera.translation - from.world_from_camera.translation) /
+           (1e-6 * static_cast<double>(to.utime_us - from.utime_us));
+  };
+  return at->second.world_from_camera.rotation.inverse() *
+         (0.5 * (per_s(before->second, at->second) + per_s(at->second, after->second)));
+}
+
+}  // namespace
+
+std::optional<Consistency> MeasureConsistency(const OfflineRun& run, const std::vector<GroundTruthPose>& truth,
+                                              bool with_scale) {
+  std::map<FrameId, GroundTruthPose> truth_of;
+  std::vector<Eigen::Vector3d> estimated_places, true_places;
+  for (const GroundTruthPose& pose : truth) truth_of[pose.frame] = pose;
+  std::map<KeyframeId, Rigid3> true_keyframes;
+  for (const PoseEstimate& pose : run.poses) {
+    if (pose.state != TrackingState::kTracked || !truth_of.contains(pose.frame)) continue;
+    estimated_places.push_back(pose.world_from_camera.translation);
+    true_places.push_back(truth_of[pose.frame].world_from_camera.translation);
+    if (pose.is_keyframe) true_keyframes[pose.reference_keyframe] = truth_of[pose.frame].world_from_camera;
+  }
+  const std::optional<Alignment> alignment = AlignPoints(estimated_places, true_places, with_scale);
+  if (!alignment) return std::nullopt;
+  const double scale = alignment->b_from_a.scale;
+  const int num_dof = with_scale ? 5 : 6;
+  Consistency sum;
+  int num_velocities = 0;
+  for (const PoseEstimate& pose : run.poses) {
+    const auto keyframe = true_keyframes.find(pose.reference_keyframe);
+    if (pose.is_keyframe || !pose.body.has_covariance || keyframe == true_keyframes.end()) continue;
+    Rigid3 estimate = pose.reference_from_camera;
+    estimate.translation *= scale;
+    const Rigid3 true_pose = keyframe->second.Inverse() * truth_of[pose.frame].world_from_camera;
+    const Rigid3 difference = estimate.Inverse() * true_pose;
+    Vector6d e, unit = Vector6d::Ones();
+    e << difference.translation, LogSO3(difference.rotation);
+    unit.head<3>() *= scale;
+    const Eigen::Vector3d way = estimate.rotation.inverse() * estimate.translation;
+    const double nees = Nees(e, unit.asDiagonal() * pose.body.covariance * unit.asDiagonal(),
+                             with_scale ? std::optional(way) : std::nullopt);
+    ++sum.num_poses;
+    sum.nees_per_dof += nees / num_dof;
+    sum.share_within += nees < (with_scale ? 11.070 : 12.592) ? 1.0 : 0.0;  // 95 % of chi-square
+    const std::optional<Eigen::Vector3d> velocity = TrueVelocity(truth_of, pose.frame);
+    if (!velocity || !pose.body.has_motion) continue;
+    sum.velocity_rms += (scale * pose.body.motion.velocity - *velocity).squaredNorm();
+    ++num_velocities;
+  }
+  if (sum.num_poses == 0) return std::nullopt;
+  sum.nees_per_dof /= sum.num_poses;
+  sum.share_within /= sum.num_poses;
+  sum.velocity_rms = std::sqrt(sum.velocity_rms / std::max(1, num_velocities));
+  return sum;
 }
 
 std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,

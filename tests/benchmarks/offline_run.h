@@ -49,6 +49,20 @@ struct OfflineRun {
 void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& tracker_options, int64_t map_delay_frames,
           OfflineRun& run);
 
+// How true the poses' own word on their errors is. Of tracked frames that are no keyframes, against their reference
+// keyframe: e = the true pose relative to that keyframe, seen from the estimated one.
+struct Consistency {
+  int num_poses = 0;
+  double nees_per_dof = 0.0;  // mean of e' covariance^-1 e / dof; 1 if the covariance is true
+  double share_within = 0.0;  // of poses whose e the covariance holds with 95 %
+  double velocity_rms = 0.0;  // m/s: of the velocity's error, against the mean over the steps before and after
+};
+
+// `with_scale`: mono, whose lengths are free. The estimates take the scale of the whole run, and each e its own (one
+// degree of freedom less). nullopt if no pose can be compared.
+std::optional<Consistency> MeasureConsistency(const OfflineRun& run, const std::vector<GroundTruthPose>& truth,
+                                              bool with_scale);
+
 // RMS distance [m] of the positions from the true ones after the best alignment; nullopt if too few are known.
 std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,
                                bool with_scale);

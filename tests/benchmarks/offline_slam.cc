@@ -7,6 +7,7 @@
 // OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimization), trajectory_live.txt and
 // ground_truth.txt, TUM rows each.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -128,6 +129,12 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
               map.Sha256Hex().c_str());
   std::printf("RMS error %.4f m, live %.4f m\n", RmsError(optimized, sequence.ground_truth, is_mono).value_or(-1.0),
               RmsError(run.Live(), sequence.ground_truth, is_mono).value_or(-1.0));
+  if (const auto consistency = MeasureConsistency(run, sequence.ground_truth, is_mono)) {
+    const double dof = is_mono ? 5.0 : 6.0;
+    std::printf("NEES / %.0f %.2f (95 %% band 1 +- %.2f), %.0f %% within 95 %%; velocity error %.3f m/s RMS\n", dof,
+                consistency->nees_per_dof, 1.96 * std::sqrt(2.0 / (dof * consistency->num_poses)),
+                100.0 * consistency->share_within, consistency->velocity_rms);
+  }
   PrintTimes("extraction", sequence.extract_ms, sequence.frames.size());
   PrintTimes("tracker", run.track_ms, sequence.frames.size());
   PrintTimes("mapper", run.map_ms, sequence.frames.size());

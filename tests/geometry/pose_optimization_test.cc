@@ -157,29 +157,6 @@ TEST(OptimizePose, TheInformationSaysHowWrongThePoseIs) {
   EXPECT_GT(MeanNees({}, kNumDraws, true), 5.0 * 6.0) << "depths that are taken as exact: far too sure of itself";
 }
 
-// As it is published: of errors from the right, of the camera's pose in the world.
-TEST(OptimizePose, ThePublishedCovarianceIsConsistent) {
-  constexpr int kNumDraws = 200;
-  double sum = 0.0;
-  for (unsigned seed = 0; seed < kNumDraws; ++seed) {
-    const UncertainScene scene = MakeUncertainScene(seed);
-    const PoseOptimizationResult result = scene.Optimize();
-    const std::optional<Matrix6d> covariance = PoseCovariance(result.information);
-    ASSERT_TRUE(covariance);
-    const Rigid3 error = result.camera_from_world * scene.truth.Inverse();  // world_from_camera^-1 * the true one
-    Eigen::Matrix<double, 6, 1> tangent;
-    tangent << error.translation, LogSO3(error.rotation);
-    sum += tangent.dot(covariance->ldlt().solve(tangent));
-  }
-  EXPECT_NEAR(sum / kNumDraws, 6.0, 1.96 * std::sqrt(2.0 * 6.0 / kNumDraws)) << "95 % of chi-square";
-}
-
-TEST(OptimizePose, WhatNothingIsKnownOfHasNoCovariance) {
-  Matrix6d information = Matrix6d::Identity();
-  information(2, 2) = 0.0;
-  EXPECT_FALSE(PoseCovariance(information));
-}
-
 // What a dozen points of this depth, each known up to a share of its distance, say of the pose.
 Eigen::Matrix<double, 6, 6> InformationOfPoints(double depth, double relative_sigma) {
   std::vector<PoseObservation> observations;

@@ -160,7 +160,9 @@ class Launcher:
     def run(self) -> int:
         """The exit status. All processes have ended when it returns or raises."""
         arguments = self._arguments
-        stack = f"{arguments.sensor}, {arguments.extractors} extractors, {arguments.tiles} tiles"
+        extractors = "1 extractor" if arguments.extractors == 1 else f"{arguments.extractors} extractors"
+        tiles = "whole images" if arguments.tiles == "1x1" else f"{arguments.tiles} tiles"
+        stack = f"{arguments.sensor}, {extractors}, {tiles}"
         title = f"version {tessera_version()}: {self._source.name}, {stack}"
         ended = "complete"
         began = time.monotonic()

@@ -82,9 +82,10 @@ class RunLines(_Context):
         if time.monotonic() - self._last < LINE_PERIOD_S:
             return
         self._last = time.monotonic()
+        time_left = f"{format_duration(progress.time_left_s)} left, " if progress.num_frames else ""
         say(
             f"frame {progress.num_poses}{progress.of_all_frames}, {progress.frames_per_s:.1f}/s, "
-            f"{format_duration(progress.time_left_s)} left, {progress.state}, latency {progress.latency_text}, "
+            f"{time_left}{progress.state}, latency {progress.latency_text}, "
             f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, "
             f"dropped {progress.dropped_text}"
         )
@@ -167,10 +168,10 @@ def _draw_bar(progress: Progress) -> Table:
     row.add_column(ratio=1)
     row.add_column(justify="right", no_wrap=True)
     of_all = f"/{progress.num_frames}" if progress.num_frames else ""
-    time_left = format_duration(progress.time_left_s)
+    time_left = f"  {format_duration(progress.time_left_s)} left" if progress.num_frames else ""
     row.add_row(
         ProgressBar(total=progress.num_frames or None, completed=progress.num_poses, pulse=not progress.num_frames),
-        f"{progress.num_poses}{of_all} frames  {progress.frames_per_s:5.1f}/s  {time_left} left",
+        f"{progress.num_poses}{of_all} frames  {progress.frames_per_s:5.1f}/s{time_left}",
     )
     return row
 

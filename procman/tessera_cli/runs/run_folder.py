@@ -7,6 +7,8 @@ import csv
 import datetime
 import json
 import os
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ from tessera_cli.runs.trajectories import Trajectory, TrajectoryError, absolute_
 from tessera_cli.settings import Settings
 from tessera_cli.text import visible, visible_values
 
+TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d")
 # What a run leaves; files of an earlier run in the same folder must not be taken for its own.
 RUN_FILES = (
     "summary.json",
@@ -289,14 +292,25 @@ def read_loops(path: Path) -> list[Loop]:
 
 def read_source_events(folder: Path) -> list[str]:
     """What happened to a live source, in order, each with its time of day: silence, broken and new connections."""
-    lines = []
+    lines: list[tuple[int, str]] = []
     for name in ("camera", "dispatcher"):
         path = folder / f"{name}.log"
         if path.is_file():
-            lines += [line for line in path.read_text(errors="replace").splitlines() if _is_source_event(line)]
-    events = [f"{line.split()[0]}: {line.split(': ', 1)[1]}." for line in sorted(lines)]
+            dated = _with_days(path.read_text(errors="replace").splitlines())
+            lines += [(day, line) for day, line in dated if _is_source_event(line)]
+    events = [f"{line.split()[0]}: {line.split(': ', 1)[1]}." for _, line in sorted(lines)]
     more = len(events) - MAX_EVENTS
     return events if more <= 0 else [*events[:MAX_EVENTS], f"{more} more events of the source are in {folder}."]
+
+
+def _with_days(lines: list[str]) -> Iterator[tuple[int, str]]:
+    """Each with how often midnight has passed since the first: lines of logs begin with the time of day."""
+    day, latest = 0, ""
+    for line in lines:
+        if TIME_OF_DAY.match(line):
+            day += 1 if line[:8] < latest else 0
+            latest = line[:8]
+        yield day, line
 
 
 def _is_source_event(line: str) -> bool:

@@ -21,6 +21,7 @@ from tessera_cli.versions import collect_versions
 
 # Frames with doubtful steps that are no farther apart belong to one stretch.
 MAX_GAP_FRAMES = 30
+MAX_SCALE_WARNINGS = 5  # sentences; a camera that is thrown about may give one every few seconds
 # A live pose that comes later was queued: one frame is extracted, one tracked, and one waits (latency_watch.h).
 MAX_LATENCY_INTERVALS = 3
 
@@ -204,9 +205,16 @@ def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
     """
     if frames is None:
         return []
-    contradicted = [(stretch[0], _contradiction(stretch, sensor)) for stretch in _stretches(frames, "contradicted")]
-    open_scale = [(stretch[0], _open_scale(frames, stretch)) for stretch in _stretches(frames, "open")]
-    return [sentence for _, sentence in sorted(contradicted + open_scale)]
+    contradicted = [(stretch, _contradiction(stretch, sensor)) for stretch in _stretches(frames, "contradicted")]
+    open_scale = [(stretch, _open_scale(frames, stretch)) for stretch in _stretches(frames, "open")]
+    doubts = sorted(contradicted + open_scale)
+    sentences = [sentence for _, sentence in doubts]
+    more = len(doubts) - MAX_SCALE_WARNINGS
+    if more <= 0:
+        return sentences
+    were = "There was one more such doubt" if more == 1 else f"There were {more} more such doubts, the last"
+    last = f"{were} {_where(doubts[-1][0])}: is_step_doubtful and scale_sigma in frames.csv."
+    return [*sentences[:MAX_SCALE_WARNINGS], last]
 
 
 def _stretches(frames: Frames, doubt: str) -> list[list[int]]:

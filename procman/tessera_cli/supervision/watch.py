@@ -90,6 +90,8 @@ class Watcher:
 
     def _progress_lines(self) -> list[str]:
         """One for each list whose tracker publishes poses."""
+        if not self._sheriff.deputies:
+            return ["no deputy answers: `tessera deputy` starts one; `tessera run` has a panel of its own"]
         lines = [f"{name}: {words}" for (name, _, _), each in self._monitors.items() if (words := each.describe())]
         return lines or ["no pose yet"]
 

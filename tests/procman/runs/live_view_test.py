@@ -73,3 +73,8 @@ def test_the_path_stays_bounded() -> None:
     progress = _progress(10_000)
     assert 500 <= len(progress.path) <= 1000
     assert progress.path[-1][0] > 980
+
+
+def test_a_camera_without_an_end_has_no_time_left() -> None:
+    assert " left" in _drawn(_progress(), 80)
+    assert " left" not in _drawn(Progress(num_frames=None), 80)

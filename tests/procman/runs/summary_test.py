@@ -79,6 +79,12 @@ def test_doubts_of_both_kinds_come_in_the_order_of_their_frames() -> None:
     assert "at frame 100 by a factor" in first and "at frame 300: the images contradicted" in second
 
 
+def test_many_doubts_are_counted() -> None:
+    sentences = scale_warnings(_frames(1000, list(range(50, 1000, 100))), "mono")
+    assert len(sentences) == 6
+    assert sentences[-1].startswith("There were 5 more such doubts, the last at frame 950: ")
+
+
 def test_complete_means_that_every_frame_is_accounted_for() -> None:
     assert judge_end("complete", {"frames": 60, "frames_missing": 0}) == "complete"
     assert judge_end("complete", {"frames": 59, "frames_missing": 1}) == (
@@ -147,6 +153,19 @@ def test_every_event_of_a_live_source_is_told_in_order(tmp_path: Path) -> None:
     ]
     assert events[-1] == "20:00:13.700: images come again, after 4.7 s of silence."
     assert read_log_warnings(tmp_path) == ["camera reported 1 problem, the first: the disk is slow"]
+
+
+def test_events_after_midnight_come_after_those_before(tmp_path: Path) -> None:
+    (tmp_path / "camera.log").write_text(
+        "23:59:50.000 camera info: tessera-camera 1.0.0\n00:00:01.000 camera warning: the camera is connected again\n"
+    )
+    (tmp_path / "dispatcher.log").write_text(
+        "23:59:51.000 dispatcher info: tessera-dispatcher 1.0.0\n"
+        "23:59:58.000 dispatcher warning: no image for 2.0 s: the run waits for the source\n"
+        "00:00:02.000 dispatcher warning: images come again, after 4.7 s of silence\n"
+    )
+    hours = [event[:8] for event in read_source_events(tmp_path)]
+    assert hours == ["23:59:58", "00:00:01", "00:00:02"]
 
 
 def test_the_occupancy_map_has_a_hash_where_there_is_one(tmp_path: Path) -> None:

@@ -272,6 +272,15 @@ def test_watch_prints_lines_without_a_terminal(make_node: MakeNode) -> None:
         watch.kill()
 
 
+def test_watch_says_where_no_deputy_is(make_node: MakeNode) -> None:
+    watch = make_node(COMMANDS).start_command("watch")
+    try:
+        assert read_line(watch).startswith("no deputy answers: ")
+    finally:
+        watch.kill()
+        watch.wait()
+
+
 def test_a_busy_port_is_told(make_node: MakeNode) -> None:
     node = make_node(COMMANDS)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:

@@ -1,0 +1,86 @@
+#include "tracking/pose_covariance.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <random>
+
+#include "matching/frame_pose.h"
+#include "measurement/keypoint_measurement.h"
+#include "support/synthetic_world.h"
+
+namespace tessera {
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+constexpr int kNumDraws = 120;
+
+// Moves keypoints by noise of this size on their level; `num_alike` that follow one another stand at the same corner,
+// see the same point and err alike.
+TrackedFrame Blurred(const SyntheticWorld& world, const TrackedFrame& frame, double sigma_px, size_t num_alike,
+                     std::mt19937_64& generator) {
+  std::normal_distribution<double> normal(0.0, sigma_px);
+  FeatureFrame features = frame.view->features();
+  const Rigid3 camera_from_world = frame.world_from_camera.Inverse();
+  const CameraCalibration& camera = world.calibration();
+  std::vector<SeenPoint> points = frame.points;
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (i % num_alike != 0) {
+      points[i] = points[i - 1];
+    } else {
+      const Eigen::Vector3d at = camera_from_world * points[i].landmark.position_in_world;
+      const double dx = normal(generator), dy = normal(generator);
+      corner = {camera.fx_px * at.x() / at.z() + camera.cx_px + dx, camera.fy_px * at.y() / at.z() + camera.cy_px + dy};
+    }
+    features.keypoints[i].x_px = static_cast<float>(corner.x());
+    features.keypoints[i].y_px = static_cast<float>(corner.y());
+    features.keypoints[i].level = 0;
+  }
+  TrackedFrame blurred(ViewOf(features));
+  blurred.world_from_camera = frame.world_from_camera;
+  blurred.points = points;
+  for (SeenPoint& point : blurred.points) point.landmark.max_distance = point.landmark.depth_sigma = 0.0;  // exact
+  return blurred;
+}
+
+// Mean over draws of e' covariance^-1 e: 6 if the covariance is true.
+double MeanNees(double sigma_px, size_t num_alike) {
+  SyntheticWorld world(SensorType::kMono, 0.0, 600 * num_alike);
+  const TrackedFrame exact = world.TrackedAt(3);
+  std::mt19937_64 generator(5);
+  double sum = 0.0;
+  for (int draw = 0; draw < kNumDraws; ++draw) {
+    TrackedFrame frame = Blurred(world, exact, sigma_px, num_alike, generator);
+    EXPECT_GT(OptimizeFrame({}, frame), 50);
+    const std::optional<Matrix6d> covariance = PoseCovariance(Map(), frame);
+    if (!covariance) return NAN;
+    const Rigid3 difference = frame.world_from_camera.Inverse() * exact.world_from_camera;
+    Vector6d e;
+    e << difference.translation, LogSO3(difference.rotation);
+    sum += e.dot(covariance->ldlt().solve(e));
+  }
+  return sum / kNumDraws;
+}
+
+// 95 % of chi-square, and the tenth by which a few hundred cells leave the covariance itself uncertain.
+const double kBand = 1.96 * std::sqrt(2.0 * 6.0 / kNumDraws) + 0.6;
+
+TEST(PoseCovariance, IsConsistent) { EXPECT_NEAR(MeanNees(0.5, 1), 6.0, kBand); }
+
+TEST(PoseCovariance, LearnsTheNoiseFromTheResiduals) { EXPECT_NEAR(MeanNees(0.1, 1), 6.0, kBand); }
+
+TEST(PoseCovariance, CountsKeypointsOfOneCornerOnce) { EXPECT_NEAR(MeanNees(0.5, 4), 6.0, kBand); }
+
+TEST(PoseCovariance, SaysNothingOfAFewPoints) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  TrackedFrame frame = world.TrackedAt(3);
+  EXPECT_TRUE(PoseCovariance(Map(), frame));
+  for (size_t i = 8; i < frame.points.size(); ++i) frame.points[i] = {};
+  EXPECT_FALSE(PoseCovariance(Map(), frame));
+}
+
+}  // namespace
+}  // namespace tessera
