@@ -90,6 +90,7 @@ class StackRun {
     StageContext& probe = bus_.AddContext("probe");
     probe.Subscribe(kPose, [this](const PoseEstimate& pose) { last_pose_ = std::max(last_pose_, pose.frame); });
     probe.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) { snapshot_ = page.part.number; });
+    probe.Subscribe(kMapDelta, [this](const MapDelta&) { ++num_deltas_; });
     bus_.Start<EvaluatorStage>("evaluator");
     bus_.Start<MapperStage>("mapper");
     bus_.Start<TrackerStage>("tracker");
@@ -124,12 +125,15 @@ class StackRun {
   MemoryBus& bus() { return bus_; }
   // The last delta that a snapshot which was asked for holds; -1: there was none.
   int64_t snapshot() const { return snapshot_; }
+  // That were sent, once or again.
+  int64_t num_deltas() const { return num_deltas_; }
 
  private:
   RunFolder folder_;
   MemoryBus bus_;
   FrameId last_pose_;
   int64_t snapshot_ = -1;
+  int64_t num_deltas_ = 0;
 };
 
 void ExpectSame(const nlohmann::json& figures) {
@@ -180,6 +184,7 @@ TEST(Revival, AnEvaluatorIsToldWhatLeftTheMapBeforeIt) {
   const nlohmann::json figures = run.Finish();
   ASSERT_FALSE(figures.is_null());
   EXPECT_GT(run.snapshot(), 40);
+  EXPECT_LT(run.num_deltas() - run.snapshot(), 240) << "each that it asks for is sent again once or twice";
   for (const char* key : {"frames_tracked", "keyframes", "trajectory_sha256", "map_sha256"}) {
     EXPECT_EQ(figures[key], expected[key]) << key;
   }
