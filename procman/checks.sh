@@ -53,6 +53,39 @@ run_sanitized() {
   tell_failures
 }
 
+# --- fuzzing --------------------------------------------------------------------------------------
+fuzz_families() { sed -nE 's/^tessera_fuzz\(([a-z_]+).*/\1/p' "$root/tests/fuzz/CMakeLists.txt"; }
+
+# run_fuzz SECONDS: the fuzz targets, in a build of their own by Clang under sanitizers, one after the other, each for its
+# share of the time. What libFuzzer finds worth keeping stays in build-fuzz/corpus: the next time goes on from there.
+run_fuzz() {
+  local family families=()
+  mapfile -t families < <(fuzz_families)
+  local share=$(($1 / ${#families[@]}))
+  prepare ask
+  install_missing clang-19 libclang-rt-19-dev llvm-19
+  configure build-fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DTESSERA_FUZZ=ON \
+    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DTESSERA_SANITIZE=address,undefined,float-cast-overflow
+  build_in build-fuzz tessera_fuzz_targets
+  finish_setup
+  for family in "${families[@]}"; do check "fuzzing: $family" run_fuzz_target "$family" $((share > 0 ? share : 1)); done
+  tell_failures
+  say "Nothing was found."
+}
+
+# run_fuzz_target FAMILY SECONDS: the last lines of its output, and all of it if it failed.
+run_fuzz_target() {
+  local folder="$root/build-fuzz/corpus/$1" target="$root/build-fuzz/tests/fuzz/$1_fuzz" log="$root/build-fuzz/$1.log"
+  "$target" --seeds "$folder"
+  if UBSAN_OPTIONS=print_stacktrace=1 "$target" -max_total_time="$2" -max_len=8192 -rss_limit_mb=2048 -timeout=20 \
+    -print_final_stats=1 -artifact_prefix="$root/build-fuzz/$1-" "$folder" >"$log" 2>&1; then
+    sed -n 's/^stat::number_of_executed_units: */tessera: inputs: /p' "$log" >&2
+  else
+    tail -n 60 "$log" >&2
+    return 1
+  fi
+}
+
 # --- lint -----------------------------------------------------------------------------------------
 cpp_sources() { find "$root/modules" "$root/procman" "$root/tests" -name '*.cc' -o -name '*.h'; }
 

@@ -75,17 +75,21 @@ check_machine() {
     fail "this system has no apt-get; Tessera is set up on Debian 12 or 13."
 }
 
+wanted_packages() { sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "$root/procman/packages.txt"; }
+
+# missing_packages NAME...: those that are not installed.
 missing_packages() {
   local wanted installed
-  wanted="$(sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "$root/procman/packages.txt" | sort)"
+  wanted="$(printf '%s\n' "$@" | sort)"
   # shellcheck disable=SC2086
   installed="$(dpkg-query -W -f='${db:Status-Status} ${Package}\n' $wanted 2>/dev/null | sed -n 's/^installed //p' | sort -u || true)"
   comm -23 <(printf '%s\n' "$wanted") <(printf '%s\n' "$installed")
 }
 
-install_packages() {
+# install_missing NAME...: of these packages.
+install_missing() {
   local missing=()
-  mapfile -t missing < <(missing_packages)
+  mapfile -t missing < <(missing_packages "$@")
   [ ${#missing[@]} -gt 0 ] || return 0
   say "These Debian packages are missing: ${missing[*]}"
   may_be_root "Installing them" "apt-get install -y ${missing[*]}" ||
@@ -237,7 +241,8 @@ prepare() {
   flock -n 9 || { say "Waiting for another tessera command that is setting up"; flock 9; }
   : >"$setup_log"
   check_machine
-  install_packages
+  # shellcheck disable=SC2046 # one word for each
+  install_missing $(wanted_packages)
   make_python_env .venv requirements.txt "which brings LCM 1.5.3"
   raise_receive_buffer "$1"
 }

@@ -15,6 +15,8 @@ namespace tessera {
 namespace {
 
 constexpr double kStepM = 0.25;
+// Of a drive along given poses: every KITTI sequence is much shorter, and streets are built all along.
+constexpr double kMaxDriveM = 50'000.0;
 constexpr double kLaneM = 1.75;    // from the street's middle to the middle of the right lane
 constexpr double kCornerM = 14.0;  // where a bend at a crossing begins
 
@@ -148,6 +150,7 @@ StreetPlan PlanFromPoses(const std::string& path, double length_m) {
     if (way.empty() || (p - way.back()).norm() > 0.1) way.push_back(p);
   }
   if (way.size() < 2) throw InputError(path + " holds no drive: fewer than two positions");
+  if (!(LengthOf(way) <= kMaxDriveM)) throw InputError(path + " holds a drive of more than 50 km");
   StreetPlan plan;
   plan.drive = Shorten(Resample(way, kStepM), length_m);
   // A street is built where the drive comes for the first time.

@@ -4,6 +4,7 @@
 // Input: the file's extension, then its bytes.
 #include <array>
 #include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "datasets/image_file.h"
@@ -36,6 +37,7 @@ std::vector<std::string> Seeds() {
 
 void Read(std::string_view text) {
   static const FuzzFolder folder;
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   FuzzInput input(text);
   const std::string name = std::string("image") + kExtensions[input.TakeByte() % kExtensions.size()];
   folder.Write(name, input.TakeRest());

@@ -31,16 +31,23 @@ void Read(std::string_view text) {
   static const Settings defaults = Settings::LoadDefaults(kDefaults);
   FuzzInput input(text);
   Settings settings = defaults;
-  if (input.TakeByte() % 2 == 0) {
-    ExpectSentence([&] { settings.Override(std::string(input.TakeRest())); });
-  } else {
-    folder.Write("settings.yaml", input.TakeRest());
-    ExpectSentence([&] { settings.OverrideFromFile(folder.path("settings.yaml")); });
-  }
-  // What was accepted can be handed to the stages.
-  folder.Write("run.yaml", settings.ToYaml());
-  const Settings again = Settings::LoadDefaults(folder.path("run.yaml"));
-  Expect(again.ToYaml() == settings.ToYaml(), "settings that were accepted do not come back the same");
+  const bool is_file = input.TakeByte() % 2 == 1;
+  bool is_accepted = false;
+  ExpectSentence([&] {
+    if (is_file) {
+      folder.Write("settings.yaml", input.TakeRest());
+      settings.OverrideFromFile(folder.path("settings.yaml"));
+    } else {
+      settings.Override(std::string(input.TakeRest()));
+    }
+    is_accepted = true;
+  });
+  if (!is_accepted) return;
+  // It can be handed to the stages.
+  const std::string run = settings.ToYaml();
+  if (run == defaults.ToYaml()) return;
+  folder.Write("run.yaml", run);
+  Expect(Settings::LoadDefaults(folder.path("run.yaml")).ToYaml() == run, "settings do not come back the same");
 }
 
 }  // namespace tessera

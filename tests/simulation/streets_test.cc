@@ -1,10 +1,12 @@
 // Streets as polylines, and the drive along them.
 #include <gtest/gtest.h>
 
+#include "core/errors.h"
 #include "simulation/drive.h"
 #include "simulation/street_map.h"
 #include "simulation/street_plan.h"
 #include "support/matchers.h"
+#include "support/temporary_folder.h"
 
 namespace tessera {
 namespace {
@@ -62,6 +64,19 @@ TEST(PlanTown, DrivesOnStreetsAndStopsAtTheLengthAskedFor) {
   const StreetMap map(plan.streets);
   for (const Eigen::Vector2d& point : plan.drive) EXPECT_LT(map.DistanceToStreet(point), kRoadHalfWidthM + 3.0);
   EXPECT_NE(LengthOf(PlanTown(5, 0.0).drive), LengthOf(PlanTown(4, 0.0).drive));
+}
+
+TEST(PlanFromPoses, FollowsADriveThatIsNotTooLong) {
+  const TemporaryFolder folder;
+  const auto plan = [&](const std::string& last) {
+    folder.Write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 " + last + "\n");
+    return PlanFromPoses(folder.path("poses.txt"), 0.0);
+  };
+  EXPECT_NEAR(LengthOf(plan("90").drive), 90.0, 1.0);
+  for (const char* last : {"1e6", "1e300"}) {
+    EXPECT_THAT([&] { plan(last); }, testing::ThrowsMessage<InputError>(HasSubstr("more than 50 km"))) << last;
+  }
+  EXPECT_THAT([&] { plan("nobody"); }, testing::ThrowsMessage<InputError>(HasSubstr("line 2: twelve numbers")));
 }
 
 }  // namespace
