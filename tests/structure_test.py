@@ -52,7 +52,7 @@ def included_by_tests() -> set[str]:
     sources = [
         path
         for path in (ROOT / "tests").rglob("*")
-        if path.suffix in (".h", ".cc") and path.parent.name != "benchmarks"
+        if path.suffix in (".h", ".cc") and path.parent.name not in ("benchmarks", "fuzz")
     ]
     return {header for path in sources for header in own_includes(path)}
 

@@ -5,7 +5,6 @@
 #include <iterator>
 
 #include "fuzz/fuzz_target.h"
-#include "settings/sections.h"
 #include "settings/settings.h"
 
 namespace tessera {
