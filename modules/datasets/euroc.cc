@@ -88,7 +88,7 @@ Sensor ReadSensor(const fs::path& path) {
 std::map<int64_t, std::string> ReadImageTable(const fs::path& camera_folder) {
   std::map<int64_t, std::string> images;
   for (const TextRow& row : ReadRows(camera_folder / "data.csv")) {
-    const int64_t time_ns = row.Integer(0);
+    const int64_t time_ns = row.TimeNs(0);
     const std::string name = row.fields.size() > 1 ? row.fields[1] : row.fields[0] + ".png";
     const std::string path = FindImage(camera_folder / "data" / name);
     if (path.empty()) {
@@ -108,7 +108,7 @@ PoseTrack ReadBodyTrack(const fs::path& path) {
     if (std::abs(rotation.norm() - 1.0) > 0.1) {
       throw InputError(row.location + ": fields 5 to 8 are not a unit quaternion w x y z: repair the file");
     }
-    world_from_body.Add(row.Integer(0),
+    world_from_body.Add(row.TimeNs(0),
                         {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});
   }
   return world_from_body;

@@ -190,7 +190,7 @@ Recording LoadKitti(const std::string& folder, const SourceOptions& options) {
                                                    : LoadCalibrationFile(options.calibration_path);
   recording.times_path = fs::path(folder) / "times.txt";
   for (const TextRow& row : ReadRows(recording.times_path)) {
-    recording.utimes_us.push_back(MicrosecondsFromSeconds(row.Number(0)));
+    recording.utimes_us.push_back(row.TimeUs(0));
   }
   OpenImages(folder, options.sensor, recording);
   ReadPoses(folder, recording);

@@ -56,6 +56,24 @@ int64_t TextRow::Integer(size_t index) const {
   return number;
 }
 
+int64_t TextRow::TimeUs(size_t index) const {
+  const double seconds = Number(index);
+  if (std::abs(seconds) > kMaxTimeS) RefuseTime(index);
+  return std::llround(seconds * 1e6);
+}
+
+int64_t TextRow::TimeNs(size_t index) const {
+  constexpr auto kMaxNs = static_cast<int64_t>(1e9 * kMaxTimeS);
+  const int64_t time_ns = Integer(index);
+  if (time_ns > kMaxNs || time_ns < -kMaxNs) RefuseTime(index);
+  return time_ns;
+}
+
+void TextRow::RefuseTime(size_t index) const {
+  throw InputError(location + ": field " + std::to_string(index + 1) + ", `" + fields[index] +
+                   "`, is no time between 1970 and 2096: repair the file");
+}
+
 std::vector<TextRow> ReadRows(const std::string& path) {
   std::istringstream text(ReadFile(path));
   std::vector<TextRow> rows;
@@ -71,7 +89,5 @@ std::vector<TextRow> ReadRows(const std::string& path) {
   }
   return rows;
 }
-
-int64_t MicrosecondsFromSeconds(double seconds) { return std::llround(seconds * 1e6); }
 
 }  // namespace tessera

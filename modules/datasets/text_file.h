@@ -16,6 +16,14 @@ struct TextRow {
   double Number(size_t index) const;
   // Field `index` as a whole number. Throws InputError.
   int64_t Integer(size_t index) const;
+  // Field `index`, a time in seconds, as microseconds, rounded to the nearest; a time in nanoseconds, whole. Throws
+  // InputError also if it is more than kMaxTimeS from 0: differences of times must be numbers too.
+  int64_t TimeUs(size_t index) const;
+  int64_t TimeNs(size_t index) const;
+  static constexpr double kMaxTimeS = 4e9;  // since 1970: until the year 2096
+
+ private:
+  [[noreturn]] void RefuseTime(size_t index) const;
 };
 
 // The rows of a file. Throws InputError if it can't be read or has no rows.
@@ -23,8 +31,5 @@ std::vector<TextRow> ReadRows(const std::string& path);
 
 // Whether the whole text is one finite number, and which.
 bool ParseNumber(const std::string& text, double& number);
-
-// Microseconds of a time in seconds, rounded to the nearest.
-int64_t MicrosecondsFromSeconds(double seconds);
 
 }  // namespace tessera

@@ -37,7 +37,7 @@ struct TimedFile {
 std::vector<TimedFile> ReadFileTable(const fs::path& folder, const std::string& table) {
   std::vector<TimedFile> files;
   for (const TextRow& row : ReadRows(folder / table)) {
-    const int64_t utime_us = MicrosecondsFromSeconds(row.Number(0));
+    const int64_t utime_us = row.TimeUs(0);
     if (row.fields.size() < 2) {
       throw InputError(row.location + " must hold `time file`: repair the file");
     }
@@ -201,7 +201,7 @@ void ReadGroundTruth(const fs::path& path, Recording& recording) {
     if (std::abs(rotation.norm() - 1.0) > 0.1) {
       throw InputError(row.location + ": fields 5 to 8 are not a unit quaternion x y z w: repair the file");
     }
-    track.Add(1000 * MicrosecondsFromSeconds(row.Number(0)),
+    track.Add(1000 * row.TimeUs(0),
               {rotation.normalized(), Eigen::Vector3d(row.Number(1), row.Number(2), row.Number(3))});
   }
   for (size_t i = 0; i < recording.utimes_us.size(); ++i) {

@@ -45,9 +45,20 @@ TEST(ParseNumber, TakesTheWholeTextOrNothing) {
   for (const char* text : {"", "1.5m", "inf", "nan", "+"}) EXPECT_FALSE(ParseNumber(text, number)) << text;
 }
 
-TEST(MicrosecondsFromSeconds, RoundsToTheNearest) {
-  EXPECT_EQ(MicrosecondsFromSeconds(1.0000004), 1000000);
-  EXPECT_EQ(MicrosecondsFromSeconds(1403636579.763555527), 1403636579763556);
+TEST(ReadRows, TimesAreRoundedToTheNearestMicrosecond) {
+  const TextRow row{"t.txt line 3", {"1.0000004", "1403636579.763555527", "1403636579763555527"}};
+  EXPECT_EQ(row.TimeUs(0), 1000000);
+  EXPECT_EQ(row.TimeUs(1), 1403636579763556);
+  EXPECT_EQ(row.TimeNs(2), 1403636579763555527);
+}
+
+// Their differences would not be numbers.
+TEST(ReadRows, TimesInNoCenturyAreRefused) {
+  for (const char* text : {"1e300", "-9e12", "9223372036854775807", "-9000000000000000000"}) {
+    const TextRow row{"t.txt line 3", {text}};
+    EXPECT_THAT([&] { (void)row.TimeUs(0); }, ThrowsMessage<InputError>(HasSubstr("line 3: field 1"))) << text;
+    EXPECT_THAT([&] { (void)row.TimeNs(0); }, ThrowsMessage<InputError>(HasSubstr("line 3: field 1"))) << text;
+  }
 }
 
 }  // namespace
