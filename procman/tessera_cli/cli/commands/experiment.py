@@ -61,6 +61,15 @@ examples:
   sudo procman/tessera experiment faults stereo=sim:street-short --faults 20 --seed 3
   procman/tessera experiment faults sim:street-short --kinds kill --processes mapper loop_closer
 """
+LATENCY = """\
+Without --source: KITTI 03 mono and EuRoC MH_01 stereo. Twelve live runs of each: with nothing else running and with an
+endless loop on every core, at the rate of the source and three times as fast, with one extractor and with two. The
+folder holds the runs, and the table as latency.md.
+
+examples:
+  procman/tessera experiment latency
+  procman/tessera experiment latency --source stereo=sim:street-short --frames 0:100
+"""
 COMPARE = """\
 examples:
   procman/tessera experiment compare logs/homogeneous logs/heterogeneous --out comparison.html
@@ -91,6 +100,7 @@ def add_parser(commands: Commands) -> None:
     compare.add_argument("first", metavar="A", help="the folder of an experiment")
     compare.add_argument("second", metavar="B", help="that of another one")
     compare.add_argument("--out", metavar="FILE.html", help="the page, default comparison.html in the working folder")
+    _add_latency(experiments)
     add_command(experiments, "extraction", _extraction, "Time per image, compared with cv::ORB.")
     places = add_command(experiments, "places", _places, "Recall and precision of place recognition.")
     places.add_argument("sources", metavar="SOURCE", nargs="*", help=SOURCES)
@@ -200,6 +210,24 @@ def _add_faults(experiments: Commands) -> None:
     add_port(parser)
 
 
+def _add_latency(experiments: Commands) -> None:
+    summary = "From a frame's capture to its pose in live runs: idle and busy machine, rates, extractors and tiles."
+    parser = add_command(experiments, "latency", _latency, summary, LATENCY)
+    parser.add_argument(
+        "--source",
+        dest="sources",
+        type=sensor_and_source,
+        metavar="SPEC",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="[mono|stereo|rgbd=]SOURCE instead of the standard sequences, default mono",
+    )
+    _add_data(parser)
+    add_frames(parser, ", for a quick check")
+    add_port(parser)
+
+
 def _add_data(parser: Parser) -> None:
     data = ROOT.parent / "shared" / "data"
     parser.add_argument(
@@ -230,6 +258,12 @@ def _performance(arguments: Namespace) -> int:
     from tessera_cli.experiments.performance import measure_performance
 
     return measure_performance(arguments)
+
+
+def _latency(arguments: Namespace) -> int:
+    from tessera_cli.experiments.latency import measure_latency
+
+    return measure_latency(arguments)
 
 
 def _extraction(_arguments: Namespace) -> int:
