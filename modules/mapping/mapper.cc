@@ -95,29 +95,15 @@ std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
   MapEditor editor(map_);
   const KeyframeId last = map_.answered();
   const bool has_moved = ApplyDue(due, {last.value + 1}, editor);
-  const bool has_culled = CullNewest(last, editor);
   // Keyframes that came after the last adjustment was requested take part in another one.
   wants_adjustment_ |= last_asked_.valid() && last_asked_ < last;
   wants_adjustment_ |= options_.polishes && !is_polish_asked_;
-  if (!has_moved && !has_culled && !wants_adjustment_) return std::nullopt;
+  if (!has_moved && !wants_adjustment_) return std::nullopt;
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(last);
-  for (const KeyframeId id : delta.removed_keyframes) motions_.erase(id);
   delta.asks_adjustment = AskForAdjustment(last);
   is_polish_asked_ |= delta.asks_adjustment;
   return delta;
-}
-
-// Of a map that was loaded: its last visit has no neighbors to come, that would need its newest keyframes. Whether any
-// went.
-bool Mapper::CullNewest(KeyframeId last, MapEditor& editor) {
-  if (!first_new_.keyframe.valid() || last < first_new_.keyframe || is_newest_culled_) return false;
-  is_newest_culled_ = true;
-  const int64_t num_before = map_.keyframes().size();
-  KeyframeCullingOptions options = options_.keyframe_culling;
-  options.kept_newest = 1;
-  CullKeyframes(last, first_new_, options, removed_, editor);
-  return map_.keyframes().size() < num_before;
 }
 
 // Whether anything moved. Loops come first, since they change more; they outdate the adjustment.

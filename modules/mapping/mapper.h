@@ -49,8 +49,7 @@ class Mapper {
   // Throws std::invalid_argument if the id is not new or the lists do not fit the keypoints.
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
   // Applies the corrections that are due when no further keyframe will come, and asks for a last global adjustment
-  // after loops, or anyway to polish the map; of a loaded map, culls the newest keyframes too. nullopt if nothing
-  // changes: then the map is final.
+  // after loops, or anyway to polish the map. nullopt if nothing changes: then the map is final.
   std::optional<MapDelta> Finish(const DueCorrections& due);
 
   const Map& map() const { return map_; }
@@ -63,7 +62,6 @@ class Mapper {
   bool ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor);
   bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
-  bool CullNewest(KeyframeId last, MapEditor& editor);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void RememberMotion(const KeyframeObservation& seen);
@@ -84,7 +82,6 @@ class Mapper {
   KeyframeId last_asked_;               // the last delta that requested an adjustment answers it
   bool is_base_outdated_ = false;       // a loop was closed since: the adjustment is ignored
   bool is_polish_asked_ = false;
-  bool is_newest_culled_ = false;
   int64_t num_void_loops_ = 0;
 };
 

@@ -82,19 +82,6 @@ class LoopMapper : public testing::Test {
   MapDelta delta_;
 };
 
-TEST_F(LoopMapper, TheEndOfAVisitLeavesOnlyItsLastKeyframeOfAKnownPlace) {
-  for (int i = 0; i < 3; ++i) Step();
-  ASSERT_NE(mapper_.map().FindKeyframe({13}), nullptr);
-  const auto delta = mapper_.Finish({});
-  ASSERT_TRUE(delta);
-  EXPECT_THAT(replica_.Apply(*delta), IsSuccess());
-  EXPECT_EQ(replica_.Sha256Hex(), mapper_.map().Sha256Hex());
-  EXPECT_EQ(mapper_.map().FindKeyframe({12}), nullptr);
-  EXPECT_TRUE(mapper_.removed_keyframes().Find(mapper_.map(), {12}));
-  EXPECT_NE(mapper_.map().FindKeyframe({14}), nullptr);
-  EXPECT_FALSE(mapper_.Finish({})) << "then it is final";
-}
-
 TEST_F(LoopMapper, ADueLoopCorrectsTheMapBeforeTheKeyframeIsInserted) {
   Step();
   const LoopResult loop = LoopAt({11}, {5});
@@ -170,7 +157,6 @@ TEST_F(LoopMapper, AnUnusableAdjustmentChangesNothing) {
   Step({{LoopAt({12}, {5})}, {}});
   GlobalAdjustment useless;
   useless.answers = delta_.answers;
-  (void)mapper_.Finish({});  // culls
   const std::optional<MapDelta> delta = mapper_.Finish({{}, useless});
   EXPECT_FALSE(delta.has_value());
 }
