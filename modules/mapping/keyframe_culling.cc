@@ -4,7 +4,6 @@
 #include <limits>
 #include <set>
 #include <span>
-#include <vector>
 
 namespace tessera {
 namespace {
@@ -40,37 +39,17 @@ bool IsRedundant(const Map& map, KeyframeId id, const KeyframeCullingOptions& op
   return num_landmarks > 0;
 }
 
-// Whether the map that was loaded shows most of what this keyframe, made since, shows.
-bool IsKnown(const Map& map, KeyframeId id, KeyframeId first_new, double known_share) {
-  if (!first_new.valid() || id < first_new) return false;  // not loaded, or there before
-  int num_landmarks = 0, num_known = 0;
-  for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
-    if (!landmark.valid()) continue;
-    ++num_landmarks;
-    num_known += map.ObservationsOf(landmark).front().keyframe < first_new ? 1 : 0;  // the oldest
-  }
-  return num_known > known_share * num_landmarks;
-}
-
-void RemoveRarelySeen(std::span<const LandmarkId> landmarks, LandmarkId first_new, int min_observers,
-                      MapEditor& editor) {
-  for (const LandmarkId id : landmarks) {
-    if (!id.valid() || id < first_new || editor.map().FindLandmark(id) == nullptr) continue;
-    if (static_cast<int>(editor.map().ObservationsOf(id).size()) < min_observers) editor.RemoveLandmark(id);
-  }
-}
-
 }  // namespace
 
 Result<> KeyframeCullingOptions::Check() const {
-  if (!(redundant_share > 0.0) || !(known_share > 0.0) || redundant_observers < 1 || kept_newest < 1) {
+  if (!(redundant_share > 0.0) || redundant_observers < 1 || kept_newest < 1) {
     return Failed("the limits of redundant keyframes must be positive");
   }
   return {};
 }
 
-void CullKeyframes(KeyframeId center, const FirstNew& first_new, const KeyframeCullingOptions& options,
-                   RemovedKeyframes& removed, MapEditor& editor) {
+void CullKeyframes(KeyframeId center, const KeyframeCullingOptions& options, RemovedKeyframes& removed,
+                   MapEditor& editor) {
   const Map& map = editor.map();
   std::set<KeyframeId> closed_a_loop;
   for (const ClosedLoop& loop : map.closed_loops()) {
@@ -80,16 +59,12 @@ void CullKeyframes(KeyframeId center, const FirstNew& first_new, const KeyframeC
   for (const KeyframeId id : map.Covisible(center, std::numeric_limits<int>::max())) {
     if (closed_a_loop.contains(id)) continue;
     const KeyframeId parent = map.FindKeyframe(id)->parent;
-    if (!parent.valid() || id.value > center.value - options.kept_newest) continue;
-    const bool is_known = IsKnown(map, id, first_new.keyframe, options.known_share);
-    if (!is_known && !IsRedundant(map, id, options)) continue;
-    const std::vector<LandmarkId> landmarks = is_known ? map.FindKeyframe(id)->landmarks : std::vector<LandmarkId>{};
+    if (!parent.valid() || id.value > center.value - options.kept_newest || !IsRedundant(map, id, options)) continue;
     map.keyframes().ForEach([&](KeyframeId child, const Keyframe& keyframe) {
       if (keyframe.parent == id) editor.SetParent(child, parent);
     });
     removed.Remember(map, id);
     editor.RemoveKeyframe(id);
-    RemoveRarelySeen(landmarks, first_new.landmark, options.min_observers, editor);
   }
 }
 

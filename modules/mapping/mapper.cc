@@ -64,12 +64,6 @@ Mapper::Mapper(const MapperOptions& options) : options_(options) {
   ThrowIfFailed<std::invalid_argument>(options.Check());
 }
 
-Result<> Mapper::Load(const MapDelta& snapshot) {
-  TESSERA_RETURN_IF_FAILED(map_.Apply(snapshot));
-  first_new_ = {{snapshot.answers.value + 1}, {map_.landmarks().end_id()}};
-  return {};
-}
-
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
@@ -83,7 +77,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   FuseLandmarks(seen.id, options_.fusion, editor);
   RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
   AdjustLocally(seen.id, options_.window, options_.bundle, motions_, editor);
-  CullKeyframes(seen.id, first_new_, options_.keyframe_culling, removed_, editor);
+  CullKeyframes(seen.id, options_.keyframe_culling, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
   for (const KeyframeId id : delta.removed_keyframes) motions_.erase(id);

@@ -42,7 +42,7 @@ class Mapper {
   explicit Mapper(const MapperOptions& options);
 
   // Starts with an existing map. To be called first, if at all. Fails as Map::Apply does.
-  Result<> Load(const MapDelta& snapshot);
+  Result<> Load(const MapDelta& snapshot) { return map_.Apply(snapshot); }
 
   // Applies the corrections that are due, inserts the keyframe and improves the map around it. The delta is a pure
   // function of all input so far; it asks for a global adjustment after a loop was closed, unless one is under way.
@@ -72,7 +72,6 @@ class Mapper {
 
   const MapperOptions options_;
   Map map_;
-  FirstNew first_new_;
   KeyframeMotions motions_;  // of keyframes in the map
   RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;

@@ -23,9 +23,9 @@ class KeyframeCulling : public testing::Test {
       planted_.Add(0, {k - 1}, 0, {}, [&](FeatureFrame& features) { change(k, features); });
     }
   }
-  void Cull(const KeyframeCullingOptions& options = {}, const FirstNew& first_new = {}) {
+  void Cull(const KeyframeCullingOptions& options = {}) {
     MapEditor editor(planted_.map());
-    CullKeyframes({kNum - 1}, first_new, options, removed_, editor);
+    CullKeyframes({kNum - 1}, options, removed_, editor);
     (void)editor.Finish({kNum - 1});
   }
   std::vector<int64_t> Left() const {
@@ -69,50 +69,6 @@ TEST_F(KeyframeCulling, KeyframesThatClosedALoopStay) {
   (void)editor.Finish({kNum - 1});
   Cull();
   EXPECT_EQ(Left(), (std::vector<int64_t>{0, 2, 5, 7, 8, 9}));
-}
-
-// Twenty observers are nowhere: what is redundant is so because the loaded map had it.
-TEST_F(KeyframeCulling, WhatALoadedMapKnewMakesNewKeyframesRedundant) {
-  Plant();
-  Cull({.redundant_observers = 20});
-  EXPECT_EQ(Left().size(), 10U) << "the map was not loaded";
-  Cull({.redundant_observers = 20}, {.keyframe = {5}, .landmark = {0}});
-  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 1, 2, 3, 4, 7, 8, 9}));
-}
-
-TEST_F(KeyframeCulling, NewLandmarksThatHardlyAnybodySeesGoWithTheirKeyframe) {
-  Plant();
-  MapEditor editor(planted_.map());
-  std::vector<LandmarkId> few;  // seen by 6 and 7 alone
-  for (const LandmarkId landmark : map().FindKeyframe({6})->landmarks) {
-    if (few.size() == 4) break;
-    few.push_back(landmark);
-    const std::vector<Observation> seen(map().ObservationsOf(landmark).begin(), map().ObservationsOf(landmark).end());
-    for (const Observation& observation : seen) {
-      const int64_t keyframe = observation.keyframe.value;
-      if (keyframe != 6 && keyframe != 7) editor.RemoveObservation(landmark, observation);
-    }
-  }
-  (void)editor.Finish({kNum - 1});
-  Cull({.redundant_observers = 20}, {.keyframe = {5}, .landmark = few[2]});
-  EXPECT_NE(map().FindLandmark(few[1]), nullptr) << "it was there before";
-  EXPECT_EQ(map().FindLandmark(few[2]), nullptr);
-  EXPECT_EQ(map().FindLandmark(few[3]), nullptr);
-}
-
-TEST_F(KeyframeCulling, KeyframesOfAnUnknownPlaceStayInALoadedMap) {
-  Plant();
-  MapEditor editor(planted_.map());
-  for (const LandmarkId landmark : map().FindKeyframe({6})->landmarks) {
-    const std::vector<Observation> seen(map().ObservationsOf(landmark).begin(), map().ObservationsOf(landmark).end());
-    if (landmark.value % 3 == 0) continue;
-    for (const Observation& observation : seen) {
-      if (observation.keyframe < KeyframeId{5}) editor.RemoveObservation(landmark, observation);
-    }
-  }
-  (void)editor.Finish({kNum - 1});
-  Cull({.redundant_observers = 20}, {.keyframe = {5}, .landmark = {0}});
-  EXPECT_EQ(Left().size(), 10U) << "a third of its landmarks is known";
 }
 
 TEST_F(KeyframeCulling, ChildrenPassToTheParentAndTheRemovedAreRemembered) {
