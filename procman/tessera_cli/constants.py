@@ -113,3 +113,18 @@ ORDER_TIMEOUT_S = 15.0
 # A deputy that in this time counts orders with unknown keys, and obeys none, counts ours.
 DISTRUST_TIMEOUT_S = 3.0
 TAIL_TIMEOUT_S = 5.0
+
+# --- Faults of `tessera experiment faults` ------------------------------------------------------------------------
+FAULT_KINDS = ("kill", "stop", "slow", "loss")
+# Of a run, those that can be killed and stopped; "extractor" stands for all of them.
+FAULT_PROCESSES = (
+    "camera",
+    "dispatcher",
+    "extractor",
+    "reassembler",
+    "tracker",
+    "mapper",
+    "loop_closer",
+    "global_adjuster",
+    "evaluator",
+)

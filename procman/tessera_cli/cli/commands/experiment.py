@@ -12,7 +12,7 @@ from tessera_cli.cli.parsing import (
     tiles,
     whole_number,
 )
-from tessera_cli.experiments.faults.schedule import KINDS, PROCESSES
+from tessera_cli.constants import FAULT_KINDS, FAULT_PROCESSES
 from tessera_cli.files import ROOT
 
 PERFORMANCE = """\
@@ -198,9 +198,15 @@ def _add_faults(experiments: Commands) -> None:
         help="that are thrown in all runs together, default 100",
     )
     parser.add_argument("--seed", type=whole_number(0, 999_999_999), metavar="S", default=1, help="default 1")
-    parser.add_argument("--kinds", choices=KINDS, nargs="+", default=list(KINDS), help="of faults, default all")
     parser.add_argument(
-        "--processes", choices=PROCESSES, nargs="+", default=list(PROCESSES), help="that they hit, default all"
+        "--kinds", choices=FAULT_KINDS, nargs="+", default=list(FAULT_KINDS), help="of faults, default all"
+    )
+    parser.add_argument(
+        "--processes",
+        choices=FAULT_PROCESSES,
+        nargs="+",
+        default=list(FAULT_PROCESSES),
+        help="that they hit, default all",
     )
     add_frames(parser, ", for a quick check")
     add_extractors(parser, 1)

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from tessera_cli.constants import FAULT_KINDS
 from tessera_cli.experiments.faults.outcome import Outcome
-from tessera_cli.experiments.faults.schedule import KINDS
 from tessera_cli.experiments.faults.tables import HEADINGS, MEANINGS, headline, make_rows
 from tessera_cli.report.drawing import CARD, Drawing, add_legend, color_of, in_order
 from tessera_cli.report.page import write_page
@@ -39,7 +39,7 @@ def draw_pauses(undisturbed: Outcome, runs: Sequence[Outcome]) -> Drawing | None
     figure = new_figure(CARD[0], max(CARD[1], 90 + ROW_HEIGHT * len(names)))
     axes = figure.subplots()
     words = []
-    for index, kind in enumerate(KINDS):
+    for index, kind in enumerate(FAULT_KINDS):
         chosen = [(names.index(fault.kind_of_process), pause) for fault, pause in known if fault.kind == kind]
         if chosen:
             heights = [row + 0.18 * (index - 1.5) for row, _ in chosen]  # kinds above each other, so that all are seen

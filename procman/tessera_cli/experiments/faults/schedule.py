@@ -7,25 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 
-KILL, STOP, SLOW, LOSS = "kill", "stop", "slow", "loss"
-KINDS = (KILL, STOP, SLOW, LOSS)
+from tessera_cli.constants import FAULT_KINDS
+
+KILL, STOP, SLOW, LOSS = FAULT_KINDS
 # Those that only root can make: a control group, and a network namespace.
 ROOT_KINDS = (SLOW, LOSS)
 # Where packets are lost.
 NETWORK = "network"
-# Of a run, those that can be killed and stopped; EXTRACTOR stands for all of them.
+# As FAULT_PROCESSES has it.
 EXTRACTOR = "extractor"
-PROCESSES = (
-    "camera",
-    "dispatcher",
-    EXTRACTOR,
-    "reassembler",
-    "tracker",
-    "mapper",
-    "loop_closer",
-    "global_adjuster",
-    "evaluator",
-)
 # From a pose that shows that the run goes on after the fault before, to the next fault.
 WAIT_S = (0.3, 2.0)
 # Of faults that have an end.

@@ -11,8 +11,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from tessera_cli.constants import FAULT_KINDS
 from tessera_cli.experiments.faults.outcome import COMPLETE, Outcome, ThrownFault
-from tessera_cli.experiments.faults.schedule import KINDS, LOSS, SLOW, STOP
+from tessera_cli.experiments.faults.schedule import LOSS, SLOW, STOP
 from tessera_cli.experiments.tables import NOTHING
 from tessera_cli.report.drawing import in_order
 
@@ -49,7 +50,7 @@ def make_rows(undisturbed: Outcome, runs: Sequence[Outcome]) -> list[Row]:
     rows = [
         _row(process, kind, undisturbed, runs)
         for process in in_order({process for process, _ in keys})
-        for kind in KINDS
+        for kind in FAULT_KINDS
         if (process, kind) in keys
     ]
     return [*rows, _row("all", "", undisturbed, runs)]
