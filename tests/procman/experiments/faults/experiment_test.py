@@ -28,7 +28,8 @@ def test_runs_with_killed_processes_end_like_the_undisturbed_one(
         "--faults",
         1,
     ]
-    words += ["--extractors", 1, "--out", out, "--port", tessera.next_port()]
+    # At its own rate: as fast as it goes, it would be over before the fault.
+    words += ["--set", "camera.pace=realtime", "--extractors", 1, "--out", out, "--port", tessera.next_port()]
     finished = tessera.command(*words).must_end_well()
     assert "1 of 1 runs with 1 faults ended with the undisturbed trajectory and map" in finished.out
     results = json.loads((out / "faults.json").read_text())
