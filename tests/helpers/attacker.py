@@ -8,6 +8,7 @@ import importlib
 import json
 import os
 import random
+import signal
 import sys
 import time
 from collections import Counter
@@ -358,6 +359,7 @@ def moved(attacker: Attacker) -> None:
 
 def main() -> None:
     port, seconds = int(sys.argv[1]), float(sys.argv[2])
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # what a background job ignores
     attacker = Attacker(port, int(sys.argv[3]) if len(sys.argv) > 3 else 0)
     until = time.monotonic() + seconds
     try:

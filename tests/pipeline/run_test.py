@@ -208,7 +208,7 @@ def test_stages_that_are_killed_one_after_the_other_change_nothing(
     tessera: Tessera, sequence: Path, reference_run: Finished
 ) -> None:
     """The tracker also before it has a map, right after it was started again, and at the end."""
-    run = KilledRun(tessera, sequence)
+    run = KilledRun(tessera, sequence, "--pace", 0.5)
     kills = {"camera": 8, "loop": 12, "reassembler": 14, "mapper": 20, "global": 24, "dispatcher": 28, "evaluator": 30}
     kills_of_tracker = [("tracker", num_poses) for num_poses in (0, 3, 16, 31, NUM_FRAMES - 10)]
     kills_in_order = sorted([*kills.items(), *kills_of_tracker], key=lambda kill: kill[1])

@@ -51,5 +51,6 @@ def test_arrays_of_negative_length_are_refused() -> None:
     ack = tessera.tile_ack_t()
     ack.num_tiles, ack.tiles = 1, [3]
     data = bytearray(ack.encode())
-    data[-8:-4] = np.array(-1, ">i4").tobytes()
+    after_count = 4 + 1 + 4  # a tile, wants_all, num_levels
+    data[-after_count - 4 : -after_count] = np.array(-1, ">i4").tobytes()
     assert decode_arrays(tessera.tile_ack_t, bytes(data)) is None

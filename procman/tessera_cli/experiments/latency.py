@@ -5,7 +5,6 @@ import itertools
 import json
 import os
 import subprocess
-import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -78,7 +77,7 @@ def measure_latency(arguments: Namespace) -> int:
 def _load(is_busy: bool) -> Iterator[None]:
     """One endless loop for each core."""
     number = (os.cpu_count() or 1) if is_busy else 0
-    loops = [subprocess.Popen([sys.executable, "-I", "-c", "while True: pass"]) for _ in range(number)]
+    loops = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(number)]
     try:
         yield
     finally:

@@ -88,7 +88,6 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
     evaluated = _read_evaluation(folder)
     not_written = [*evaluated.get("not_written", []), *facts.not_written]
     result = read_run(folder, alignment=default_alignment({"sensor": facts.sensor}))
-    doubts = scale_warnings(result.frames, facts.sensor)
     summary: Summary = {
         "source": without_password(facts.source),
         "sensor": facts.sensor,
@@ -110,8 +109,8 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         + read_source_events(folder / "stages")
         + drop_warnings(evaluated, result)
         + latency_warnings(result)
-        + doubts,
-        "doubts": doubts,
+        + scale_warnings(result.frames, facts.sensor),
+        "doubts": scale_doubts(result.frames),
         "not_written": not_written,
         "versions": collect_versions(),
     }
@@ -121,7 +120,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
 
 
 def is_trustworthy(summary: Summary) -> bool:
-    """Nothing of the run is missing, and it doubts none of its poses."""
+    """Nothing of the run is missing, and its scale is not in doubt."""
     return not summary["not_written"] and not summary["doubts"]
 
 
@@ -215,6 +214,14 @@ def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
     were = "There was one more such doubt" if more == 1 else f"There were {more} more such doubts, the last"
     last = f"{were} {_where(doubts[-1][0])}: is_step_doubtful and scale_sigma in frames.csv."
     return [*sentences[:MAX_SCALE_WARNINGS], last]
+
+
+def scale_doubts(frames: Frames | None) -> list[str]:
+    """Those among these warnings by which the run is not to be trusted: the images leave open how far the camera went.
+
+    A contradiction is none: a camera that was carried elsewhere contradicts its motion, too, and is found again.
+    """
+    return [_open_scale(frames, stretch) for stretch in _stretches(frames, "open")] if frames is not None else []
 
 
 def _stretches(frames: Frames, doubt: str) -> list[list[int]]:

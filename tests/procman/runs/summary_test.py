@@ -16,6 +16,7 @@ from tessera_cli.runs.summary import (
     latency_warnings,
     occupancy_sha256,
     occupancy_warnings,
+    scale_doubts,
     scale_warnings,
 )
 from tessera_cli.supervision.progress import FINISHED, RUNNING, Progress, StageReport, to_report
@@ -45,7 +46,10 @@ def _frames(num: int, doubtful: list[int], open_scale: dict[int, float] | None =
 def test_a_run_that_lacks_a_file_or_doubts_its_scale_is_not_to_be_trusted() -> None:
     assert is_trustworthy({"not_written": [], "doubts": []})
     assert not is_trustworthy({"not_written": ["map.ply can't be written"], "doubts": []})
-    assert not is_trustworthy({"not_written": [], "doubts": scale_warnings(_frames(400, [10]), "mono")})
+    doubts = scale_doubts(_frames(400, [10], {250: 0.4}))
+    assert not is_trustworthy({"not_written": [], "doubts": doubts})
+    assert len(doubts) == 1 and "at frame 250" in doubts[0], "a contradiction alone is none"
+    assert scale_doubts(None) == []
 
 
 def test_nothing_is_said_where_nothing_is_doubtful() -> None:
