@@ -121,17 +121,7 @@ def _add_performance(experiments: Commands) -> None:
     parser.add_argument(
         "--repetitions", type=count, metavar="N", default=5, help="runs of each sequence and commit, default 5"
     )
-    parser.add_argument(
-        "--source",
-        dest="sources",
-        type=sensor_and_source,
-        metavar="SPEC",
-        nargs="+",
-        action="extend",
-        default=[],
-        help="[mono|stereo|rgbd=]SOURCE instead of the standard sequences, default mono",
-    )
-    _add_data(parser)
+    _add_sources(parser)
     add_frames(parser, ", for a quick check")
     add_extractors(parser, 1)
     parser.add_argument(
@@ -139,8 +129,7 @@ def _add_performance(experiments: Commands) -> None:
         action="store_true",
         help="leave out the picture of a frame's way through the processes, which takes one more run of each sequence",
     )
-    parser.add_argument("--out", metavar="DIR", help="default logs/<date-time>-experiment-performance")
-    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
+    _add_out(parser, "performance")
     add_port(parser)
 
 
@@ -174,8 +163,7 @@ def _add_distribution(experiments: Commands, name: str, summary: str) -> None:
     parser.add_argument("--no-faults", action="store_true", help="leave out the killed node and the lost packets")
     add_frames(parser, ", for a quick check")
     _add_data(parser)
-    parser.add_argument("--out", metavar="DIR", help=f"default logs/<date-time>-experiment-{name}")
-    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
+    _add_out(parser, name)
     add_port(parser)
 
 
@@ -211,14 +199,19 @@ def _add_faults(experiments: Commands) -> None:
     add_frames(parser, ", for a quick check")
     add_extractors(parser, 1)
     add_settings(parser)
-    parser.add_argument("--out", metavar="DIR", help="default logs/<date-time>-experiment-faults")
-    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
+    _add_out(parser, "faults")
     add_port(parser)
 
 
 def _add_latency(experiments: Commands) -> None:
     summary = "From a frame's capture to its pose in live runs: idle and busy machine, rates, extractors and tiles."
     parser = add_command(experiments, "latency", _latency, summary, LATENCY)
+    _add_sources(parser)
+    add_frames(parser, ", for a quick check")
+    add_port(parser)
+
+
+def _add_sources(parser: Parser) -> None:
     parser.add_argument(
         "--source",
         dest="sources",
@@ -230,8 +223,11 @@ def _add_latency(experiments: Commands) -> None:
         help="[mono|stereo|rgbd=]SOURCE instead of the standard sequences, default mono",
     )
     _add_data(parser)
-    add_frames(parser, ", for a quick check")
-    add_port(parser)
+
+
+def _add_out(parser: Parser, name: str) -> None:
+    parser.add_argument("--out", metavar="DIR", help=f"default logs/<date-time>-experiment-{name}")
+    parser.add_argument("--force", action="store_true", help="an earlier experiment in --out may be replaced")
 
 
 def _add_data(parser: Parser) -> None:
