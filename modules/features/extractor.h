@@ -20,8 +20,7 @@ class Extractor {
  public:
   // The candidates of the job's tile, a pure function of the job: whatever the cut, the candidates of all tiles
   // together are those of the whole image, up to such as SelectFeatures would not take anyway and such as the job does
-  // not want. Throws
-  // std::invalid_argument with CheckTileJob's sentence if the job is malformed.
+  // not want. Throws std::invalid_argument with CheckTileJob's sentence if the job is malformed.
   TileFeatures Extract(const TileJob& job);
 
  private:
