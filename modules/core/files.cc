@@ -1,8 +1,10 @@
 #include "core/files.h"
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <system_error>
 
 #include "core/errors.h"
 
@@ -13,7 +15,14 @@ std::string ReadFile(const std::string& path) {
   if (!file || std::filesystem::is_directory(path)) {
     throw InputError("file " + path + " can't be read: check that it exists and may be read");
   }
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  std::string bytes(error ? 0 : static_cast<size_t>(size), '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<size_t>(file.gcount()));
+  // What the kernel makes as it is read, and pipes, don't tell their size.
+  if (file) bytes.append(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  return bytes;
 }
 
 void WriteFile(const std::string& path, std::string_view bytes) {

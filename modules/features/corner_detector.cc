@@ -26,44 +26,48 @@ struct Ring {
   ptrdiff_t offsets[16];
 };
 
-// The largest of the 16 minima over 9 neighbors each, for the values d[0..15] around the ring.
-// Arcs k .. k + 8 and k + 1 .. k + 9 share the eight values k + 1 .. k + 8.
-inline U8x32 BestArc(const U8x32* d) {
+using Choice = U8x32 (*)(U8x32, U8x32);
+
+// The best of the 16 worst among 9 neighbors each, for the values v[0..15] around the ring: with Min and Max the
+// highest brightness that all pixels of an arc have, with Max and Min the lowest. Arcs k .. k + 8 and k + 1 .. k + 9
+// share the eight values k + 1 .. k + 8.
+template <Choice kWorse, Choice kBetter>
+inline U8x32 BestArc(const U8x32* v) {
   U8x32 pairs[8];
-  for (int i = 0; i < 8; ++i) pairs[i] = Min(d[2 * i + 1], d[(2 * i + 2) & 15]);
+  for (int i = 0; i < 8; ++i) pairs[i] = kWorse(v[2 * i + 1], v[(2 * i + 2) & 15]);
   U8x32 quads[8];
-  for (int i = 0; i < 8; ++i) quads[i] = Min(pairs[i], pairs[(i + 1) & 7]);
-  U8x32 best = simd::Fill8(0);
-  for (int i = 0; i < 8; ++i) {
-    const U8x32 shared = Min(quads[i], quads[(i + 2) & 7]);
-    best = Max(best, Min(shared, Max(d[2 * i], d[(2 * i + 9) & 15])));
-  }
+  for (int i = 0; i < 8; ++i) quads[i] = kWorse(pairs[i], pairs[(i + 1) & 7]);
+  const auto better_of_two = [&](int i) {
+    const U8x32 shared = kWorse(quads[i], quads[(i + 2) & 7]);
+    return kWorse(shared, kBetter(v[2 * i], v[(2 * i + 9) & 15]));
+  };
+  U8x32 best = better_of_two(0);
+  for (int i = 1; i < 8; ++i) best = kBetter(best, better_of_two(i));
   return best;
 }
 
-// Upper bound of BestArc by the four pixels right, left, above and below: nine neighbors hold two of them in sequence.
-inline U8x32 ArcBound(U8x32 below, U8x32 right, U8x32 above, U8x32 left) {
-  return Min(Max(below, above), Max(right, left));
+// A bound of BestArc by the four pixels below, right, above and left: nine neighbors hold two of them in sequence.
+template <Choice kWorse, Choice kBetter>
+inline U8x32 ArcBound(const U8x32* v) {
+  return kWorse(kBetter(v[0], v[8]), kBetter(v[4], v[12]));
+}
+
+// By how much the arc is brighter than the center, or darker: what is greater.
+inline U8x32 Contrast(U8x32 brightest, U8x32 darkest, U8x32 center) {
+  return Max(SubtractSaturated(brightest, center), SubtractSaturated(center, darkest));
 }
 
 // Scores of the 32 pixels from `p` on; 0 where lower than min_score (which may be left out as well where no pixel of
 // the 32 reaches it).
 inline U8x32 Scores(const uint8_t* p, const Ring& ring, U8x32 below_min_score) {
   const U8x32 center = simd::Load8(p);
-  U8x32 brighter[16];
-  U8x32 darker[16];
-  const auto compare = [&](int i) {
-    const U8x32 value = simd::Load8(p + ring.offsets[i]);
-    brighter[i] = SubtractSaturated(value, center);
-    darker[i] = SubtractSaturated(center, value);
-  };
-  for (const int i : {0, 4, 8, 12}) compare(i);
-  const U8x32 bound = Max(ArcBound(brighter[0], brighter[4], brighter[8], brighter[12]),
-                          ArcBound(darker[0], darker[4], darker[8], darker[12]));
+  U8x32 values[16];
+  for (const int i : {0, 4, 8, 12}) values[i] = simd::Load8(p + ring.offsets[i]);
+  const U8x32 bound = Contrast(ArcBound<Min, Max>(values), ArcBound<Max, Min>(values), center);
   const U8x32 one = simd::Fill8(1);
   if (simd::AllZero(SubtractSaturated(SubtractSaturated(bound, one), below_min_score))) return simd::Fill8(0);
-  for (const int i : {1, 2, 3, 5, 6, 7, 9, 10, 11, 13, 14, 15}) compare(i);
-  return SubtractSaturated(Max(BestArc(brighter), BestArc(darker)), one);
+  for (const int i : {1, 2, 3, 5, 6, 7, 9, 10, 11, 13, 14, 15}) values[i] = simd::Load8(p + ring.offsets[i]);
+  return SubtractSaturated(Contrast(BestArc<Min, Max>(values), BestArc<Max, Min>(values), center), one);
 }
 
 // Where between the positions -1 and 1 a parabola through three scores has its maximum, in 1/kCornerSubpixels, rounded
@@ -85,16 +89,16 @@ void CornerDetector::ScoreRow(const LevelImage& image, const Rect& corners, int 
   for (int x = 0; x < corners.width + 2; x += kLanes) simd::Store(out + x, Scores(in + x, ring, below_min_score));
 }
 
-CornerDetector::Corner CornerDetector::CornerAt(const Rect& corners, int x, int y, int min_score) {
+CornerDetector::Corner CornerDetector::CornerAt(const Rect& corners, int x, int y) {
   const int column = kRowRoom + x - corners.x;
   const uint8_t* row = ScoreRowAt(y) + column;
-  // Lower ones may or may not have been computed, which depends on the cut.
-  const auto at_least = [min_score](uint8_t score) { return std::max<int>(score, min_score - 1); };
   return {.x = static_cast<int16_t>(x),
           .y = static_cast<int16_t>(y),
-          .offset_x = ParabolaMaximum(at_least(row[-1]), row[0], at_least(row[1])),
-          .offset_y = ParabolaMaximum(at_least(ScoreRowAt(y - 1)[column]), row[0], at_least(ScoreRowAt(y + 1)[column])),
-          .score = row[0]};
+          .score = row[0],
+          .left = row[-1],
+          .right = row[1],
+          .above = ScoreRowAt(y - 1)[column],
+          .below = ScoreRowAt(y + 1)[column]};
 }
 
 void CornerDetector::Insert(size_t cell, Corner corner) {
@@ -128,7 +132,7 @@ void CornerDetector::KeepMaxima(const Rect& corners, int y, int min_score) {
     for (; maxima != 0; maxima &= maxima - 1) {
       const int column = x + std::countr_zero(maxima);
       if (row[column] > lowest_[cell]) {
-        Insert(cell, CornerAt(corners, corners.x + column, y, min_score));
+        Insert(cell, CornerAt(corners, corners.x + column, y));
       }
     }
   }
@@ -145,6 +149,8 @@ void CornerDetector::Detect(const LevelImage& image, const LevelPlan& plan, int 
   lowest_.assign(num_columns, static_cast<uint8_t>(min_score - 1));
   for (auto& row : score_rows_) row.resize(std::max(row.size(), static_cast<size_t>(corners.width) + 3 * kRowRoom));
 
+  // Lower scores may or may not have been computed, which depends on the cut.
+  const auto at_least = [min_score](uint8_t score) { return std::max<int>(score, min_score - 1); };
   ScoreRow(image, corners, corners.y - 1, min_score);
   ScoreRow(image, corners, corners.y, min_score);
   for (int y = corners.y; y < corners.bottom(); ++y) {
@@ -157,8 +163,8 @@ void CornerDetector::Detect(const LevelImage& image, const LevelPlan& plan, int 
         const Corner& corner = best_[cell * static_cast<size_t>(capacity_) + static_cast<size_t>(i)];
         out.push_back({.x = corner.x,
                        .y = corner.y,
-                       .offset_x = corner.offset_x,
-                       .offset_y = corner.offset_y,
+                       .offset_x = ParabolaMaximum(at_least(corner.left), corner.score, at_least(corner.right)),
+                       .offset_y = ParabolaMaximum(at_least(corner.above), corner.score, at_least(corner.below)),
                        .level = static_cast<uint8_t>(level),
                        .score = corner.score});
       }

@@ -30,14 +30,13 @@ class CornerDetector {
   struct Corner {
     int16_t x = 0;
     int16_t y = 0;
-    int8_t offset_x = 0;
-    int8_t offset_y = 0;
     uint8_t score = 0;
+    uint8_t left = 0, right = 0, above = 0, below = 0;  // scores of its neighbors
   };
 
   void ScoreRow(const LevelImage& image, const Rect& corners, int y, int min_score);
   void KeepMaxima(const Rect& corners, int y, int min_score);
-  Corner CornerAt(const Rect& corners, int x, int y, int min_score);
+  Corner CornerAt(const Rect& corners, int x, int y);
   void Insert(size_t cell, Corner corner);
   uint8_t* ScoreRowAt(int y) { return score_rows_[static_cast<size_t>(y % 3)].data(); }
 

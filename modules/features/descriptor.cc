@@ -105,13 +105,17 @@ Descriptor Describe(const LevelImage& smoothed, int x, int y, uint8_t angle) {
     simd::Store(patch.data() + row * kPatternStride, Load8(in + row * smoothed.stride()));
   }
   const int turn = (angle + 2) / 4 % kNumTurns;
-  const uint16_t* offset = TurnedPatterns().offsets[static_cast<size_t>(turn)].data();
-  Descriptor descriptor;
+  const uint16_t* offsets = TurnedPatterns().offsets[static_cast<size_t>(turn)].data();
+  Descriptor descriptor{};
   for (uint64_t& word : descriptor) {
-    word = 0;
-    for (int bit = 0; bit < 64; ++bit, offset += 2) {
-      word |= static_cast<uint64_t>(patch[offset[0]] < patch[offset[1]]) << bit;
+    // From the highest bit down, each comes in from below. Eight are a loop that is unrolled.
+    for (int byte = 7; byte >= 0; --byte) {
+      for (int i = 7; i >= 0; --i) {
+        const uint16_t* pair = offsets + 2 * (8 * byte + i);
+        word = word + word + (patch[pair[0]] < patch[pair[1]] ? 1U : 0U);
+      }
     }
+    offsets += 128;
   }
   return descriptor;
 }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <map>
-#include <tuple>
+#include <numeric>
 #include <utility>
 
 #include "features/pyramid.h"
@@ -19,8 +19,13 @@ struct Entry {
   uint32_t index = 0;
   uint32_t cell = 0;      // counted along the rows of the level's grid
   uint32_t priority = 0;  // score, then score * weight
-  int16_t x = 0;
-  int16_t y = 0;
+};
+
+// Where a candidate stands.
+struct Spot {
+  uint32_t index = 0;  // the candidate's
+  uint16_t x = 0;
+  uint16_t y = 0;
   uint8_t level = 0;
 };
 
@@ -31,44 +36,84 @@ uint32_t RankWeight(uint32_t rank) {
   return (kHalfWeightRank << 12U) / (kHalfWeightRank + rank);
 }
 
-bool IsBefore(const Entry& a, const Entry& b) {
-  return std::tie(a.level, a.y, a.x, a.index) < std::tie(b.level, b.y, b.x, b.index);
-}
-bool IsSamePlace(const Entry& a, const Entry& b) { return a.level == b.level && a.y == b.y && a.x == b.x; }
+bool IsSamePlace(const Spot& a, const Spot& b) { return a.level == b.level && a.y == b.y && a.x == b.x; }
 
-uint32_t CellOf(const CameraCalibration& calibration, const Candidate& candidate) {
-  const int num_columns = CellAxis(LevelSize(calibration.width_px, candidate.level)).num_cells();
-  const int column = (candidate.x - kBorderPx) / kCellPx;
-  const int row = (candidate.y - kBorderPx) / kCellPx;
-  return static_cast<uint32_t>(row * num_columns + column);
+// Sorts by a small whole number, key_of(item), in linear time. Those with equal keys keep their order: sorting by the
+// least important key first sorts by several.
+template <class Item, class KeyOf>
+void SortByKey(std::vector<Item>& items, KeyOf key_of) {
+  uint32_t num_keys = 0;
+  for (const Item& item : items) num_keys = std::max(num_keys, uint32_t{key_of(item)} + 1);
+  std::vector<uint32_t> begin(num_keys + 1);  // by key: where the next item with it goes
+  for (const Item& item : items) ++begin[key_of(item) + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<Item> sorted(items.size());
+  for (const Item& item : items) sorted[begin[key_of(item)]++] = item;
+  items.swap(sorted);
 }
 
-// Distinct candidates in the order (level, y, x).
-std::vector<Entry> SortedEntries(const CameraCalibration& calibration, std::span<const Candidate> candidates) {
-  std::vector<Entry> entries;
-  entries.reserve(candidates.size());
-  for (size_t i = 0; i < candidates.size(); ++i) {
-    const Candidate& candidate = candidates[i];
-    entries.push_back({.index = static_cast<uint32_t>(i),
-                       .cell = CellOf(calibration, candidate),
-                       .priority = candidate.score,
-                       .x = candidate.x,
-                       .y = candidate.y,
-                       .level = candidate.level});
+// By level: the number of columns of its cells.
+std::array<int, kMaxLevels> NumColumns(const CameraCalibration& calibration) {
+  std::array<int, kMaxLevels> num_columns{};
+  for (int level = 0; level < kMaxLevels; ++level) {
+    num_columns[static_cast<size_t>(level)] = CellAxis(LevelSize(calibration.width_px, level)).num_cells();
   }
-  std::sort(entries.begin(), entries.end(), IsBefore);
-  entries.erase(std::unique(entries.begin(), entries.end(), IsSamePlace), entries.end());
-  return entries;
+  return num_columns;
 }
+
+// Those of distinct candidates in the order (level, y, x).
+std::vector<Spot> SortedSpots(std::span<const Candidate> candidates) {
+  std::vector<Spot> spots(candidates.size());
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    spots[i] = {.index = static_cast<uint32_t>(i),
+                .x = static_cast<uint16_t>(candidates[i].x),
+                .y = static_cast<uint16_t>(candidates[i].y),
+                .level = candidates[i].level};
+  }
+  SortByKey(spots, [](const Spot& spot) { return spot.x; });
+  SortByKey(spots, [](const Spot& spot) { return spot.y; });
+  SortByKey(spots, [](const Spot& spot) { return spot.level; });
+  spots.erase(std::unique(spots.begin(), spots.end(), IsSamePlace), spots.end());
+  return spots;
+}
+
+// Of distinct candidates in the order (level, y, x), one level after the other.
+struct Entries {
+  Entries(const CameraCalibration& calibration, std::span<const Candidate> candidates) {
+    const std::array<int, kMaxLevels> num_columns = NumColumns(calibration);
+    const std::vector<Spot> spots = SortedSpots(candidates);
+    all.reserve(spots.size());
+    std::array<size_t, kMaxLevels> sizes{};
+    for (const Spot& spot : spots) {
+      const int column = (spot.x - kBorderPx) / kCellPx, row = (spot.y - kBorderPx) / kCellPx;
+      all.push_back({.index = spot.index,
+                     .cell = static_cast<uint32_t>(row * num_columns[spot.level] + column),
+                     .priority = candidates[spot.index].score});
+      ++sizes[spot.level];
+    }
+    size_t first = 0;
+    for (size_t level = 0; level < levels.size(); first += sizes[level], ++level) {
+      levels[level] = std::span(all).subspan(first, sizes[level]);
+    }
+  }
+  Entries(const Entries&) = delete;
+  Entries& operator=(const Entries&) = delete;
+
+  std::vector<Entry> all;
+  std::array<std::span<Entry>, kMaxLevels> levels;
+};
 
 // Turns the scores of one level into priorities.
 void WeighByRank(std::span<Entry> level) {
-  std::sort(level.begin(), level.end(), [](const Entry& a, const Entry& b) {
-    return std::tie(a.cell, b.priority, a.y, a.x) < std::tie(b.cell, a.priority, b.y, b.x);
-  });
-  for (size_t i = 0, first_of_cell = 0; i < level.size(); ++i) {
-    if (level[i].cell != level[first_of_cell].cell) first_of_cell = i;
-    level[i].priority *= RankWeight(static_cast<uint32_t>(i - first_of_cell));
+  std::vector<uint32_t> order(level.size());
+  std::iota(order.begin(), order.end(), 0U);
+  uint32_t best = 0;
+  for (const Entry& entry : level) best = std::max(best, entry.priority);
+  SortByKey(order, [&](uint32_t i) { return best - level[i].priority; });
+  SortByKey(order, [&](uint32_t i) { return level[i].cell; });
+  for (size_t i = 0, first_of_cell = 0; i < order.size(); ++i) {
+    if (level[order[i]].cell != level[order[first_of_cell]].cell) first_of_cell = i;
+    level[order[i]].priority *= RankWeight(static_cast<uint32_t>(i - first_of_cell));
   }
 }
 
@@ -90,26 +135,17 @@ std::array<size_t, kMaxLevels> ShareOut(const FeatureOptions& options,
   return taken;
 }
 
-// The weighed entries of one level, moved so that the `count` best come first; count > 0. Returns the lowest priority
-// among these.
-uint32_t PutBestFirst(std::span<Entry> level, size_t count) {
-  const auto last = level.begin() + static_cast<ptrdiff_t>(count) - 1;
-  std::nth_element(level.begin(), last, level.end(), [](const Entry& a, const Entry& b) {
-    return std::tie(b.priority, a.y, a.x) < std::tie(a.priority, b.y, b.x);
-  });
-  return last->priority;
-}
+// The better an entry of a level, the lower: by priority, then y, then x, in which order the entries stand.
+uint64_t Place(std::span<const Entry> level, size_t i) { return uint64_t{UINT32_MAX - level[i].priority} << 32U | i; }
+uint32_t PriorityAt(uint64_t place) { return UINT32_MAX - static_cast<uint32_t>(place >> 32U); }
 
-// The entries of each level, one level after the other in `entries`.
-std::array<std::span<Entry>, kMaxLevels> ByLevel(std::vector<Entry>& entries) {
-  std::array<size_t, kMaxLevels> sizes{};
-  for (const Entry& entry : entries) ++sizes[entry.level];
-  std::array<std::span<Entry>, kMaxLevels> levels;
-  size_t first = 0;
-  for (size_t level = 0; level < levels.size(); first += sizes[level], ++level) {
-    levels[level] = std::span(entries).subspan(first, sizes[level]);
-  }
-  return levels;
+// The place of the last one among the `count` best weighed entries of a level; count > 0.
+uint64_t PlaceOfLast(std::span<const Entry> level, size_t count) {
+  std::vector<uint64_t> places(level.size());
+  for (size_t i = 0; i < level.size(); ++i) places[i] = Place(level, i);
+  const auto last = places.begin() + static_cast<ptrdiff_t>(count) - 1;
+  std::nth_element(places.begin(), last, places.end());
+  return *last;
 }
 
 // What is known of the candidates that were found, sent or not.
@@ -126,29 +162,30 @@ struct Choice {
 
 Choice Choose(const CameraCalibration& calibration, const FeatureOptions& options,
               std::span<const Candidate> candidates, Found found) {
-  std::vector<Entry> entries = SortedEntries(calibration, candidates);
-  const std::array<std::span<Entry>, kMaxLevels> levels = ByLevel(entries);
+  Entries entries(calibration, candidates);
+  const std::array<std::span<Entry>, kMaxLevels>& levels = entries.levels;
   for (size_t l = 0; l < levels.size(); ++l) found.num[l] = std::max(found.num[l], levels[l].size());
   const std::array<size_t, kMaxLevels> taken = ShareOut(options, found.num);
   Choice choice;
-  std::vector<Entry> chosen;
-  chosen.reserve(static_cast<size_t>(options.num_features));
+  choice.indices.reserve(static_cast<size_t>(options.num_features));
   for (size_t l = 0; l < static_cast<size_t>(options.num_levels); ++l) {
     const std::span<Entry> level = levels[l];
     const size_t num = std::min(taken[l], level.size());
     uint32_t lowest = 0;
     if (num > 0 && num < found.num[l]) {
       WeighByRank(level);
-      lowest = PutBestFirst(level, num);
+      const uint64_t last = PlaceOfLast(level, num);
+      lowest = PriorityAt(last);
+      for (size_t i = 0; i < level.size(); ++i) {
+        if (Place(level, i) <= last) choice.indices.push_back(level[i].index);
+      }
+    } else {
+      for (const Entry& entry : level.first(num)) choice.indices.push_back(entry.index);
     }
     const bool all_are_here = level.size() == found.num[l];
     if (!all_are_here && (num < taken[l] || lowest < found.min_priority[l])) choice.is_certain = false;
     choice.lowest_priority.push_back(static_cast<int32_t>(lowest));
-    chosen.insert(chosen.end(), level.begin(), level.begin() + static_cast<ptrdiff_t>(num));
   }
-  std::sort(chosen.begin(), chosen.end(), IsBefore);
-  choice.indices.reserve(chosen.size());
-  for (const Entry& entry : chosen) choice.indices.push_back(entry.index);
   return choice;
 }
 
@@ -205,14 +242,13 @@ std::vector<LevelCut> LeaveOutBelow(const std::vector<int32_t>& min_priority, co
                                     std::vector<Candidate>& candidates) {
   std::vector<LevelCut> cuts;
   for (const int32_t priority : min_priority) cuts.push_back({.min_priority = priority});
-  std::vector<Entry> entries = SortedEntries(calibration, candidates);
+  Entries entries(calibration, candidates);
   std::vector<uint32_t> kept;
-  for (const std::span<Entry> level : ByLevel(entries)) {
-    WeighByRank(level);
-    for (const Entry& entry : level) {
-      LevelCut& cut = cuts.at(entry.level);
-      ++cut.num_found;
-      if (std::cmp_greater_equal(entry.priority, cut.min_priority)) kept.push_back(entry.index);
+  for (size_t l = 0; l < cuts.size(); ++l) {
+    WeighByRank(entries.levels[l]);
+    cuts[l].num_found += static_cast<int32_t>(entries.levels[l].size());
+    for (const Entry& entry : entries.levels[l]) {
+      if (std::cmp_greater_equal(entry.priority, cuts[l].min_priority)) kept.push_back(entry.index);
     }
   }
   std::sort(kept.begin(), kept.end());

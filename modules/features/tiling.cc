@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <functional>
+#include <utility>
 
 #include "core/errors.h"
 #include "features/pyramid.h"
@@ -76,23 +77,29 @@ Result<> CheckImages(const TileJob& job) {
   return {};
 }
 
-// Part of a level of the image.
-GrayImage CropLevel(const GrayImage& image, int level, const Rect& rect) {
-  return level == 0 ? Crop(image, rect) : Crop(ReduceToLevel(image, level), rect);
+// Part of the image; the image itself if that is all of it and nobody else needs it.
+template <class Pixel>
+Image<Pixel> Take(Image<Pixel>& image, const Rect& rect, bool is_only_job) {
+  const bool is_whole = rect == Rect{.x = 0, .y = 0, .width = image.width, .height = image.height};
+  return is_only_job && is_whole ? std::move(image) : Crop(image, rect);
+}
+// Likewise of a level of the image.
+GrayImage TakeLevel(GrayImage& image, int level, const Rect& rect, bool is_only_job) {
+  return level == 0 ? Take(image, rect, is_only_job) : Crop(ReduceToLevel(image, level), rect);
 }
 
 // Rectangles and pixels of the job, for the core and the levels that it has.
-void TakePixels(const CameraFrame& frame, TileJob& job, const TilePlan& plan) {
+void TakePixels(CameraFrame& frame, TileJob& job, const TilePlan& plan, bool is_only_job) {
   const LevelPlan& needed = plan.levels[static_cast<size_t>(job.first_level)];
   job.left_rect = needed.left;
-  job.left = CropLevel(frame.left, job.first_level, job.left_rect);
+  job.left = TakeLevel(frame.left, job.first_level, job.left_rect, is_only_job);
   if (job.calibration.sensor == SensorType::kStereo) {
     job.right_rect = needed.right;
-    job.right = CropLevel(frame.right, job.first_level, job.right_rect);
+    job.right = TakeLevel(frame.right, job.first_level, job.right_rect, is_only_job);
   }
   if (job.calibration.sensor == SensorType::kRgbd) {
     job.depth_rect = plan.depth;
-    job.depth = Crop(frame.depth, job.depth_rect);
+    job.depth = Take(frame.depth, job.depth_rect, is_only_job);
   }
 }
 
@@ -130,9 +137,10 @@ TileGrid ParseTileGrid(const std::string& text) {
   return grid;
 }
 
-std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t captured_us,
+std::vector<TileJob> CutFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t captured_us,
                               TileGrid grid, int coarse_levels_from, const FeatureOptions& options) {
   CheckFrame(frame, calibration, options);
+  const bool is_cut = grid.lines * grid.columns > 1;
   std::vector<TileJob> jobs;
   const auto add = [&](const Rect& core, int first_level, int last_level, bool even_if_idle) {
     if (first_level > last_level) return;
@@ -147,11 +155,10 @@ std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration&
     job.first_level = first_level;
     job.last_level = last_level;
     job.core = core;
-    TakePixels(frame, job, plan);
+    TakePixels(frame, job, plan, !is_cut);
   };
 
   const Rect whole{.x = 0, .y = 0, .width = calibration.width_px, .height = calibration.height_px};
-  const bool is_cut = grid.lines * grid.columns > 1;
   const int first_coarse_level = is_cut ? std::clamp(coarse_levels_from, 0, options.num_levels) : 0;
   add(whole, first_coarse_level, options.num_levels - 1, false);
   for (int line = 0; is_cut && line < grid.lines; ++line) {

@@ -32,7 +32,7 @@ TileGrid ParseTileGrid(const std::string& text);
 //
 // captured_us is copied into the jobs. Throws InputError if the options, the calibration or the sizes of the images are
 // wrong.
-std::vector<TileJob> CutFrame(const CameraFrame& frame, const CameraCalibration& calibration, int64_t captured_us,
+std::vector<TileJob> CutFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t captured_us,
                               TileGrid grid, int coarse_levels_from, const FeatureOptions& options);
 
 // What the job costs: the pixels of all its pyramid levels; at least 1.

@@ -6,6 +6,7 @@
 
 #include "features/extractor.h"
 #include "features/selection.h"
+#include "features/tile_packing.h"
 #include "features/tiling.h"
 #include "support/feature_images.h"
 #include "support/warped_pairs.h"
@@ -70,6 +71,14 @@ void CvOrb(benchmark::State& state) {
   state.counters["repeatability"] = repeatability;
 }
 
+size_t NumBytes(const std::vector<TileJob>& jobs) {
+  size_t bytes = 0;
+  for (const TileJob& job : jobs) {
+    bytes += job.left.pixels.size() + job.right.pixels.size() + 2 * job.depth.pixels.size() + job.packed.pixels.size();
+  }
+  return bytes;
+}
+
 // Extraction of all jobs of an image by one extractor, and selection.
 void Extraction(benchmark::State& state, SensorType sensor, TileGrid grid, int coarse_levels_from) {
   const std::vector<std::vector<TileJob>> jobs = Cut(sensor, grid, coarse_levels_from);
@@ -87,13 +96,9 @@ void Extraction(benchmark::State& state, SensorType sensor, TileGrid grid, int c
     frame = SelectFeatures(tiles).value().features;
     benchmark::DoNotOptimize(frame.keypoints.data());
   }
-  size_t bytes = 0;
-  for (const TileJob& job : jobs.front()) {
-    bytes += job.left.pixels.size() + job.right.pixels.size() + 2 * job.depth.pixels.size();
-  }
   state.counters["keypoints"] = static_cast<double>(frame.keypoints.size());
   state.counters["candidates"] = static_cast<double>(num_candidates);
-  state.counters["wire_kB"] = static_cast<double>(bytes) / 1000.0;
+  state.counters["wire_kB"] = static_cast<double>(NumBytes(jobs.front())) / 1000.0;
   if (sensor != SensorType::kMono) return;
   // Of the whole image: that the cut changes nothing is what the tests of losslessness show.
   static const double repeatability = MeanRepeatability(ExtractTessera);
@@ -110,6 +115,37 @@ void Cutting(benchmark::State& state, TileGrid grid, int coarse_levels_from) {
   }
 }
 
+// All jobs of an image, for links to other machines.
+std::vector<TileJob> Packed(const std::vector<TileJob>& jobs) {
+  std::vector<TileJob> packed;
+  for (const TileJob& job : jobs) packed.push_back(PackTile(job));
+  return packed;
+}
+
+// What the dispatcher does to them.
+void Packing(benchmark::State& state, TileGrid grid) {
+  const std::vector<std::vector<TileJob>> jobs = Cut(SensorType::kMono, grid, 4);
+  size_t i = 0;
+  double num_bytes = 0.0, num_packed = 0.0;
+  for (auto _ : state) {
+    const std::vector<TileJob>& image = jobs[i++ % kNumImages];
+    const std::vector<TileJob> packed = Packed(image);
+    num_bytes += static_cast<double>(NumBytes(image));
+    num_packed += static_cast<double>(NumBytes(packed));
+  }
+  state.counters["share"] = num_packed / num_bytes;
+}
+
+// And the extractors.
+void Unpacking(benchmark::State& state, TileGrid grid) {
+  std::vector<std::vector<TileJob>> jobs = Cut(SensorType::kMono, grid, 4);
+  for (std::vector<TileJob>& image : jobs) image = Packed(image);
+  size_t i = 0;
+  for (auto _ : state) {
+    for (TileJob job : jobs[i++ % kNumImages]) benchmark::DoNotOptimize(UnpackTile(job).has_value());
+  }
+}
+
 BENCHMARK(CvOrb)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, whole, SensorType::kMono, TileGrid{1, 1}, 0)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, cut_2x2, SensorType::kMono, TileGrid{2, 2}, 4)->Unit(benchmark::kMillisecond);
@@ -123,6 +159,10 @@ BENCHMARK_CAPTURE(Extraction, cut_2x8_coarse_from_8, SensorType::kMono, TileGrid
 BENCHMARK_CAPTURE(Extraction, whole_stereo, SensorType::kStereo, TileGrid{1, 1}, 0)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Extraction, cut_2x8_stereo, SensorType::kStereo, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(Cutting, cut_2x8, TileGrid{2, 8}, 4)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Packing, whole, TileGrid{1, 1})->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Packing, cut_2x8, TileGrid{2, 8})->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Unpacking, whole, TileGrid{1, 1})->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(Unpacking, cut_2x8, TileGrid{2, 8})->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace tessera

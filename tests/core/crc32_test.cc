@@ -19,6 +19,7 @@ TEST(Crc32, AgreesWithTheStandard) {
 
 TEST(Crc32, OfPartsIsThatOfTheWhole) {
   EXPECT_EQ(Crc32(BytesOf("6789"), Crc32(BytesOf("12345"))), Crc32(BytesOf("123456789")));
+  EXPECT_EQ(Crc32({}, Crc32(BytesOf("12345"))), Crc32(BytesOf("12345")));
 }
 
 TEST(Crc32, SeesEveryBit) {

@@ -43,6 +43,30 @@ TEST(IdMap, ValuesStayWhereTheyAreWhileOthersComeAndGo) {
   map.ForEach([](LandmarkId id, const std::string& value) { EXPECT_EQ(value, std::to_string(id.value)); });
 }
 
+// All ids below 6400 of which one in a hundred stays, among many that come and go.
+TEST(IdMap, WalksAndFindsAcrossStretchesOfRemovedIds) {
+  IdMap<LandmarkId, int64_t> map;
+  for (int64_t i = 0; i < 6400; ++i) {
+    map.Put({i}, i);
+    if (i >= 10 && (i - 10) % 100 != 0) map.Remove({i - 10});
+  }
+  for (int64_t i = 6390; i < 6400; ++i) map.Remove({i});
+  std::vector<int64_t> walked;
+  IdMap<LandmarkId, int64_t> copy = map;
+  copy.ForEach([&](LandmarkId id, int64_t value) {
+    EXPECT_EQ(id.value, value);
+    walked.push_back(value);
+  });
+  EXPECT_EQ(walked.size(), 64u);
+  EXPECT_EQ(map.size(), 64);
+  EXPECT_EQ(copy.end_id(), 6400) << "no id is given twice";
+  EXPECT_TRUE(map.Has({6300}));
+  EXPECT_FALSE(map.Has({6299}));
+  copy.Put({6299}, 6299);
+  EXPECT_TRUE(copy.Has({6299}));
+  EXPECT_FALSE(map.Has({6299}));
+}
+
 TEST(IdMap, ARemovedValueLetsGoOfWhatItHeld) {
   const auto held = std::make_shared<int>(1);
   IdMap<LandmarkId, std::shared_ptr<int>> map;
