@@ -77,6 +77,7 @@ std::optional<int32_t> EpipolarSearch::BestOnLine(int32_t keypoint, const PixelO
     near = far + (near - far) * ((far.z() - 0.05) / (far.z() - near.z()));
   }
   const Eigen::Vector2d a = calibration_.Project(far), b = calibration_.Project(near);
+  if (!IsInImage(calibration_, a)) return std::nullopt;
   const Eigen::Vector2d along = b - a;
   const double length = along.norm();
   const Eigen::Vector2d unit = length > 1e-9 ? Eigen::Vector2d(along / length) : Eigen::Vector2d::UnitX();
@@ -87,23 +88,26 @@ std::optional<int32_t> EpipolarSearch::BestOnLine(int32_t keypoint, const PixelO
   int32_t best = -1;
   Eigen::Vector2d best_px = Eigen::Vector2d::Zero();
   const double margin_px = limits_px_[static_cast<size_t>(std::min(kTopLevel, from.level + 2))];
-  grid_.VisitSegment(a, b, margin_px, [&](const PlacedKeypoint& to) {
-    if (std::abs(int{to.level} - int{from.level}) > 2) return;
+  const PatchRange range = PatchRange::Levels(from.level - 2, from.level + 2).WithAnglesNear(from.angle + roll_);
+  grid_.VisitSegment(a, b, margin_px, range, [&](const PlacedKeypoint& to) {
     const double x_px = static_cast<double>(to.x_px) - a.x(), y_px = static_cast<double>(to.y_px) - a.y();
     const double limit = limits_px_[std::min<size_t>(to.level, kMaxLevels - 1)];
     const double along_px = unit.x() * x_px + unit.y() * y_px, aside_px = unit.x() * y_px - unit.y() * x_px;
-    if (std::abs(aside_px) > limit || along_px < -limit || along_px > length + limit) return;
-    if (!AreAnglesNear(from.angle, to.angle, roll_) || !is_free_(to.index)) return;
+    // One branch, nearly always the same: by turns, each condition would be guessed wrong for many.
+    bool is_near = std::abs(aside_px) <= limit;
+    is_near &= along_px >= -limit;
+    is_near &= along_px <= length + limit;
+    if (!is_near || !is_free_(to.index)) return;
     const int distance = HammingDistance(descriptor, second_.descriptors[Index(to.index)]);
     const Eigen::Vector2d to_px(to.x_px, to.y_px);
     // The same corner found on another level is not a second candidate.
-    const bool is_elsewhere = best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
+    const auto is_elsewhere = [&] { return best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level); };
     if (distance < best_distance) {
-      if (is_elsewhere && best >= 0) second_distance = best_distance;
+      if (best >= 0 && is_elsewhere()) second_distance = best_distance;
       best_distance = distance;
       best = to.index;
       best_px = to_px;
-    } else if (is_elsewhere && distance < second_distance) {
+    } else if (distance < second_distance && is_elsewhere()) {
       second_distance = distance;
     }
   });

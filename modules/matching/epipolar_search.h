@@ -36,6 +36,10 @@ struct EpipolarOptions {
 // Looks near a keypoint's epipolar line, on the segment for depths from `min_depth` to infinity. A pair must agree in
 // descriptor, orientation and level, and its point must lie in front of both cameras, project to both keypoints
 // (chi-square), and have distances that fit the levels.
+//
+// The segment's far end must lie in the second image. Where it lies beside it, a far point has no true match: what is
+// found for it is false, and always too near. In an open bend, where skylines turn into view and all look alike, most
+// pairs were such ones, and the scale followed them.
 class EpipolarSearch {
  public:
   // The features must outlive the search. `is_free` says which keypoints of the second view take part; one that a

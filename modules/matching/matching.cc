@@ -9,11 +9,10 @@ std::vector<Match> MatchInWindow(const FrameView& first, std::span<const Eigen::
   std::vector<Match> matches;
   for (int i = 0; i < first.size(); ++i) {
     const int level = first.keypoint(i).level;
+    const PatchRange range = PatchRange::Levels(level - 1, level + 1);
     BestMatch best;
-    second.grid().VisitWindow(centers_px[static_cast<size_t>(i)], radius_px, [&](const PlacedKeypoint& to) {
-      if (std::abs(to.level - level) <= 1) {
-        best.Offer(to.index, HammingDistance(first.descriptor(i), second.descriptor(to.index)));
-      }
+    second.grid().VisitWindow(centers_px[static_cast<size_t>(i)], radius_px, range, [&](const PlacedKeypoint& to) {
+      best.Offer(to.index, HammingDistance(first.descriptor(i), second.descriptor(to.index)));
     });
     if (best.IsClear(options)) {
       matches.push_back({i, best.index, best.distance});

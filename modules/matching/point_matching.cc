@@ -69,10 +69,10 @@ int MatchLast(const TrackedFrame& last, double radius_px, const MatchOptions& op
     if (point.z() <= 0.0) continue;
     const Eigen::Vector2d pixel = view.calibration.Project(point);
     const Keypoint& from = last.view->keypoint(static_cast<int>(i));
+    const PatchRange range = PatchRange::Levels(from.level - 1, from.level + 1).WithAnglesNear(from.angle + roll);
     int best_distance = options.max_hamming + 1;
     int32_t best = -1;
-    frame.view->grid().VisitWindow(pixel, radius_px * LevelScale(from.level), [&](const PlacedKeypoint& to) {
-      if (std::abs(int{to.level} - int{from.level}) > 1 || !AreAnglesNear(from.angle, to.angle, roll)) return;
+    frame.view->grid().VisitWindow(pixel, radius_px * LevelScale(from.level), range, [&](const PlacedKeypoint& to) {
       const int distance =
           HammingDistance(last.view->descriptor(static_cast<int>(i)), frame.view->descriptor(to.index));
       if (distance < best_distance) {
@@ -97,10 +97,11 @@ int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& 
     const double radius = radius_px * (expected->cos_angle > 0.998 ? 0.625 : 1.0) * LevelScale(expected->level);
     int best_distance = options.max_hamming + 1, second_distance = 257, best_level = -1, second_level = -1;
     int32_t best = -1;
-    frame.view->grid().VisitWindow(expected->pixel_px, radius, [&](const PlacedKeypoint& placed) {
+    const PatchRange range = PatchRange::Levels(expected->level - 1, expected->level);
+    frame.view->grid().VisitWindow(expected->pixel_px, radius, range, [&](const PlacedKeypoint& placed) {
       const int level = placed.level;
       const int32_t candidate = placed.index;
-      if (level < expected->level - 1 || level > expected->level || was_seeing[Index(candidate)] != 0) return;
+      if (was_seeing[Index(candidate)] != 0) return;
       if (!IsRightNear(frame.view->observation(candidate), view.calibration, *expected, radius)) return;
       const int distance = HammingDistance(landmark.descriptor, frame.view->descriptor(candidate));
       if (distance < best_distance) {

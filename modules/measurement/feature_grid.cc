@@ -25,28 +25,17 @@ FeatureGrid::FeatureGrid(const std::vector<Keypoint>& keypoints, int width_px, i
     begin_[cell + 1] += begin_[cell];
   }
   placed_.resize(begin_[num_cells]);
+  levels_.resize(placed_.size() + kLanes);
+  angles_.resize(placed_.size() + kLanes);
   std::vector<uint32_t> next(begin_.begin(), begin_.end() - 1);
   for (size_t i = 0; i < keypoints.size(); ++i) {
     if (cells[i] == num_cells) continue;
     const Keypoint& k = keypoints[i];
-    placed_[next[cells[i]]++] = {k.x_px, k.y_px, static_cast<int32_t>(i), k.level, k.angle};
+    const uint32_t place = next[cells[i]]++;
+    placed_[place] = {k.x_px, k.y_px, static_cast<int32_t>(i), k.level, k.angle};
+    levels_[place] = k.level;
+    angles_[place] = k.angle;
   }
-}
-
-FeatureGrid::Span FeatureGrid::SegmentInRow(const Eigen::Vector2d& from_px, const Eigen::Vector2d& to_px,
-                                            double radius_px, int row) const {
-  // The piece of the segment whose y lies within radius of the row of cells, as parameters 0..1 along it.
-  const double top = row * kCellPx - radius_px, bottom = (row + 1) * kCellPx + radius_px;
-  const double rise = to_px.y() - from_px.y();
-  double begin = 0.0, end = 1.0;
-  if (std::abs(rise) > 1e-9) {
-    const double a = (top - from_px.y()) / rise, b = (bottom - from_px.y()) / rise;
-    begin = std::clamp(std::min(a, b), 0.0, 1.0);
-    end = std::clamp(std::max(a, b), 0.0, 1.0);
-  }
-  const double x_begin = from_px.x() + begin * (to_px.x() - from_px.x());
-  const double x_end = from_px.x() + end * (to_px.x() - from_px.x());
-  return {Column(std::min(x_begin, x_end) - radius_px), Column(std::max(x_begin, x_end) + radius_px)};
 }
 
 }  // namespace tessera

@@ -23,7 +23,17 @@ inline constexpr double kRgbdDisparitySigmaPx = 0.2;
 double Baseline(const CameraCalibration& calibration);
 
 // The keypoint as a measurement, with the noise of its level; a depth as the right column that it stands for.
-PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint);
+inline PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint) {
+  const Keypoint& k = features.keypoints[static_cast<size_t>(keypoint)];
+  PixelObservation seen{{k.x_px, k.y_px}, kNoColumn, kKeypointSigmaPx * LevelScale(k.level)};
+  if (features.calibration.sensor == SensorType::kStereo) {
+    seen.right_x_px = k.right_x_px >= 0.0F && k.right_x_px < k.x_px ? k.right_x_px : kNoColumn;
+  } else if (features.calibration.sensor == SensorType::kRgbd && k.depth_m > 0.0F) {
+    seen.right_x_px = k.x_px - features.calibration.fx_px * kRgbdBaseline / k.depth_m;
+    seen.disparity_sigma_px = kRgbdDisparitySigmaPx;
+  }
+  return seen;
+}
 
 // The keypoint's point by its own depth or right column, in the camera frame; nullopt where it has none.
 std::optional<Eigen::Vector3d> PointFromDepth(const FeatureFrame& features, int32_t keypoint);

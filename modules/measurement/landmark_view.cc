@@ -30,6 +30,11 @@ FeatureGrid MakeGrid(const FeatureFrame& features) {
   return {features.keypoints, features.calibration.width_px, features.calibration.height_px};
 }
 
+bool IsInImage(const CameraCalibration& camera, const Eigen::Vector2d& pixel_px) {
+  return pixel_px.x() >= 0.0 && pixel_px.x() < camera.width_px && pixel_px.y() >= 0.0 &&
+         pixel_px.y() < camera.height_px;
+}
+
 View::View(const CameraCalibration& camera, const Rigid3& world_from_camera) : calibration(camera) {
   const Rigid3 camera_from_world = world_from_camera.Inverse();
   rotation = camera_from_world.rotation.toRotationMatrix();
@@ -42,10 +47,7 @@ std::optional<ExpectedView> Expect(const View& view, const Landmark& landmark) {
   if (!(point.z() > 0.0)) return std::nullopt;
   ExpectedView expected;
   expected.pixel_px = view.calibration.Project(point);
-  if (!(expected.pixel_px.x() >= 0.0 && expected.pixel_px.x() < view.calibration.width_px &&
-        expected.pixel_px.y() >= 0.0 && expected.pixel_px.y() < view.calibration.height_px)) {
-    return std::nullopt;
-  }
+  if (!IsInImage(view.calibration, expected.pixel_px)) return std::nullopt;
   const Eigen::Vector3d to_camera = view.camera_in_world - landmark.position_in_world;
   expected.depth = point.z();
   expected.distance = to_camera.norm();

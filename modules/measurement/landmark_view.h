@@ -20,6 +20,8 @@ double MedianDepth(const Map& map, const Keyframe& keyframe);
 // The features' keypoints by position.
 FeatureGrid MakeGrid(const FeatureFrame& features);
 
+bool IsInImage(const CameraCalibration& camera, const Eigen::Vector2d& pixel_px);
+
 // A camera at a pose, ready to project many landmarks.
 struct View {
   View(const CameraCalibration& camera, const Rigid3& world_from_camera);
@@ -41,12 +43,6 @@ struct ExpectedView {
 // nullopt where the landmark stands behind the camera or off the image, too near or too far for its patch to be found
 // (with a fifth of tolerance), or is seen from more than 60 degrees aside of its normal.
 std::optional<ExpectedView> Expect(const View& view, const Landmark& landmark);
-
-// Whether two orientations (1/256 turn) differ by `expected` up to 30 degrees.
-inline bool AreAnglesNear(uint8_t a, uint8_t b, uint8_t expected = 0) {
-  const auto difference = static_cast<uint8_t>(b - a - expected);
-  return difference <= 21 || difference >= 256 - 21;
-}
 
 // By how much the image turns about the optical axis from one camera to another, in 1/256 turn.
 uint8_t RollBetween(const Rigid3& second_from_first);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "measurement/landmark_view.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 
@@ -47,6 +48,25 @@ TEST_F(EpipolarPairs, TakeFreeKeypointsOnly) {
     EXPECT_EQ(match->keypoint % 2, 0);
   }
   EXPECT_GT(num, 100);
+}
+
+// The camera turns to the right by a quarter of its view: what lies at the right side now, and far away, did not stand
+// in the image before.
+TEST_F(EpipolarPairs, AreNotLookedForWhereAFarPointHasNone) {
+  const Rigid3 turned = SyntheticWorld::Pose(2) * Rigid3{ExpSO3({0.0, 0.4, 0.0}), Eigen::Vector3d::Zero()};
+  const SyntheticWorld::Picture now = world_.Take(3, turned);
+  const Rigid3 before_from_now = SyntheticWorld::Pose(0).Inverse() * turned;
+  const EpipolarSearch search(now.features, first_.features, before_from_now, AnyKeypoint, 1.0, options_);
+  int num_inside = 0;
+  for (size_t i = 0; i < now.points.size(); ++i) {
+    const PixelObservation seen = SeenAt(now.features, static_cast<int32_t>(i));
+    const Eigen::Vector3d far = before_from_now.rotation * world_.calibration().Ray(seen.pixel_px);
+    const bool is_inside = far.z() > 0.0 && IsInImage(world_.calibration(), world_.calibration().Project(far));
+    const bool is_found = search.Find(static_cast<int32_t>(i)).has_value();
+    num_inside += is_inside && is_found ? 1 : 0;
+    EXPECT_TRUE(is_inside || !is_found) << "keypoint " << i;
+  }
+  EXPECT_GT(num_inside, 50);
 }
 
 TEST(EpipolarOptions, OutOfRangeIsRefused) {

@@ -18,13 +18,13 @@ Keypoint At(float x_px, float y_px) { return {.x_px = x_px, .y_px = y_px}; }
 
 std::vector<int32_t> Window(const FeatureGrid& grid, const Eigen::Vector2d& center_px, double radius_px) {
   std::vector<int32_t> found;
-  grid.VisitWindow(center_px, radius_px, [&](const PlacedKeypoint& placed) { found.push_back(placed.index); });
+  grid.VisitWindow(center_px, radius_px, {}, [&](const PlacedKeypoint& placed) { found.push_back(placed.index); });
   return found;
 }
 
 std::vector<int32_t> Segment(const FeatureGrid& grid, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
   std::vector<int32_t> found;
-  grid.VisitSegment(from, to, 2.0, [&](const PlacedKeypoint& placed) { found.push_back(placed.index); });
+  grid.VisitSegment(from, to, 2.0, {}, [&](const PlacedKeypoint& placed) { found.push_back(placed.index); });
   return found;
 }
 
@@ -92,13 +92,39 @@ TEST(FeatureGrid, TakesTheKeypointsThatItIsToldTo) {
 TEST(FeatureGrid, TellsWhatASearchAsksOfAKeypoint) {
   const std::vector<Keypoint> keypoints = {{.x_px = 50.5F, .y_px = 20.0F, .level = 3, .angle = 70}};
   const FeatureGrid grid(keypoints, kWidth, kHeight);
-  grid.VisitWindow({50, 20}, 1.0, [](const PlacedKeypoint& placed) {
+  grid.VisitWindow({50, 20}, 1.0, {}, [](const PlacedKeypoint& placed) {
     EXPECT_EQ(placed.x_px, 50.5F);
     EXPECT_EQ(placed.y_px, 20.0F);
     EXPECT_EQ(placed.level, 3);
     EXPECT_EQ(placed.angle, 70);
   });
   EXPECT_THAT(Window(grid, {50, 20}, 1.0), ElementsAre(0));
+}
+
+TEST(FeatureGrid, ASearchMeetsTheLevelsAndOrientationsThatItWants) {
+  std::mt19937_64 generator(5);
+  std::uniform_int_distribution<int> level(0, 7), angle(0, 255);
+  std::vector<Keypoint> keypoints(300, At(50, 50));
+  for (Keypoint& keypoint : keypoints) {
+    keypoint.level = static_cast<uint8_t>(level(generator));
+    keypoint.angle = static_cast<uint8_t>(angle(generator));
+  }
+  const FeatureGrid grid(keypoints, kWidth, kHeight);
+  for (int i = 0; i < 50; ++i) {
+    const int wanted_level = level(generator), wanted_angle = angle(generator);
+    std::vector<int32_t> expected;
+    for (size_t k = 0; k < keypoints.size(); ++k) {
+      const int turn = std::abs(keypoints[k].angle - wanted_angle);
+      const bool is_near = std::min(turn, 256 - turn) <= 21;
+      if (is_near && std::abs(keypoints[k].level - wanted_level) <= 1) expected.push_back(static_cast<int32_t>(k));
+    }
+    const PatchRange range = PatchRange::Levels(wanted_level - 1, wanted_level + 1).WithAnglesNear(wanted_angle);
+    std::vector<int32_t> in_window, on_segment;
+    grid.VisitWindow({50, 50}, 1.0, range, [&](const PlacedKeypoint& k) { in_window.push_back(k.index); });
+    grid.VisitSegment({40, 40}, {60, 60}, 1.0, range, [&](const PlacedKeypoint& k) { on_segment.push_back(k.index); });
+    EXPECT_THAT(in_window, testing::ElementsAreArray(expected));
+    EXPECT_THAT(on_segment, testing::ElementsAreArray(expected));
+  }
 }
 
 TEST(FeatureGrid, AnEmptyGridHoldsNothing) {

@@ -73,14 +73,6 @@ TEST(Expect, NothingFromMoreThan60DegreesAside) {
   EXPECT_NEAR(from(30.0)->cos_angle, std::cos(M_PI / 6.0), 1e-9);
 }
 
-TEST(AreAnglesNear, Within30DegreesOfTheExpectedRoll) {
-  EXPECT_TRUE(AreAnglesNear(10, 31));
-  EXPECT_FALSE(AreAnglesNear(10, 33));
-  EXPECT_TRUE(AreAnglesNear(250, 5)) << "across zero";
-  EXPECT_TRUE(AreAnglesNear(10, 74, 64));
-  EXPECT_FALSE(AreAnglesNear(10, 10, 64));
-}
-
 TEST(RollBetween, IsTheTurnAboutTheOpticalAxis) {
   const auto roll = [](double degrees) {
     return RollBetween({ExpSO3({0.0, 0.0, degrees * M_PI / 180.0}), Eigen::Vector3d::Zero()});
