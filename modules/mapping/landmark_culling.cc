@@ -49,9 +49,9 @@ void RemoveUnconfirmed(KeyframeId center, const std::vector<LandmarkId>& created
     if (landmark == nullptr) continue;
     const auto num_expected = std::count_if(views.begin(), views.end(),
                                             [&](const View& view) { return Expect(view, *landmark).has_value(); });
-    // The newest keyframe observes it in any case.
-    const auto num_observations = static_cast<double>(map.ObservationsOf(id).size());
-    if (num_observations < options.min_seen_share * static_cast<double>(num_expected + 1)) editor.RemoveLandmark(id);
+    // The pair that made it says nothing: of the two, the newest keyframe is not among the views.
+    const auto num_others = static_cast<double>(map.ObservationsOf(id).size()) - 2.0;
+    if (num_others < options.min_seen_share * static_cast<double>(num_expected - 1)) editor.RemoveLandmark(id);
   }
 }
 

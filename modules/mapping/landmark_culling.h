@@ -36,7 +36,8 @@ class RecentLandmarks {
 };
 
 // Removes those of the landmarks just created that too few keyframes around `center` observe, of those that should by
-// their pose: mostly chance pairs. To be called after duplicates have been fused.
+// their pose: mostly chance pairs. The two keyframes that made a landmark don't count, on either side: they were chosen
+// because they agree. To be called after duplicates have been fused.
 void RemoveUnconfirmed(KeyframeId center, const std::vector<LandmarkId>& created, const LandmarkCullingOptions& options,
                        MapEditor& editor);
 

@@ -21,8 +21,8 @@ int32_t BestKeypoint(const Keyframe& keyframe, const FeatureGrid& grid, const Vi
   const double radius_px = options.radius_px * LevelScale(expected->level);
   int32_t best = -1;
   int best_distance = options.max_hamming + 1;
-  grid.VisitWindow(expected->pixel_px, radius_px, [&](const PlacedKeypoint& placed) {
-    if (placed.level < expected->level - 1 || placed.level > expected->level) return;
+  const PatchRange range = PatchRange::Levels(expected->level - 1, expected->level);
+  grid.VisitWindow(expected->pixel_px, radius_px, range, [&](const PlacedKeypoint& placed) {
     const int distance = HammingDistance(landmark.descriptor, keyframe.features->descriptors[Index(placed.index)]);
     if (distance >= best_distance) return;
     const PixelObservation seen = SeenAt(*keyframe.features, placed.index);

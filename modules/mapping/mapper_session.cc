@@ -45,10 +45,10 @@ Result<MapperActions> MapperSession::Load(const MapDelta& snapshot) {
   return actions;
 }
 
-MapperActions MapperSession::Receive(const KeyframeObservation& keyframe) {
+MapperActions MapperSession::Receive(KeyframeObservation keyframe) {
   if (keyframe.id == next_keyframe_) {
     ++next_keyframe_.value;
-    waiting_.push_back(keyframe);
+    waiting_.push_back(std::move(keyframe));
     return {};
   }
   has_failed_ = true;

@@ -54,7 +54,7 @@ class MapperSession {
   Result<MapperActions> Load(const MapDelta& snapshot);
 
   // Keyframes must come without gaps: each delta answers one, and the tracker waits for it.
-  MapperActions Receive(const KeyframeObservation& keyframe);
+  MapperActions Receive(KeyframeObservation keyframe);
   MapperActions Receive(const LoopResult& result);
   MapperActions Receive(const GlobalAdjustment& adjustment);
   // A follower of the map lacks something: it is answered at once.

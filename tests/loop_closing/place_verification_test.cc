@@ -57,7 +57,8 @@ TEST_F(PlaceCoverage, OneMatchOfACellIsEnough) {
 
 TEST_F(PlaceCoverage, WithoutAnythingToSeeItIsNone) {
   EXPECT_EQ(Coverage({}, *frame_), 0.0);
-  frame_->world_from_camera = planted_.Truth({3}) * Rigid3{ExpSO3({0.0, 3.1, 0.0}), {}};  // looks back
+  frame_->world_from_camera =
+      planted_.Truth({3}) * Rigid3{ExpSO3({0.0, 3.1, 0.0}), Eigen::Vector3d::Zero()};  // looks back
   EXPECT_EQ(Coverage(points_, *frame_), 0.0);
 }
 

@@ -33,6 +33,20 @@ class KeyframeCulling : public testing::Test {
     map().keyframes().ForEach([&](KeyframeId id, const Keyframe&) { left.push_back(id.value); });
     return left;
   }
+  void ForEachObservation(const std::function<void(LandmarkId, const Observation&)>& visit) const {
+    const Map before = map();
+    before.landmarks().ForEach([&](LandmarkId id, const ObservedLandmark& landmark) {
+      for (const Observation& seen : landmark.observations) visit(id, seen);
+    });
+  }
+  // Takes observations from keyframes 0 .. 2.
+  void ForgetInFirstVisit(const std::function<bool(LandmarkId)>& forgets) {
+    MapEditor editor(planted_.map());
+    ForEachObservation([&](LandmarkId landmark, const Observation& seen) {
+      if (seen.keyframe.value < 3 && forgets(landmark)) editor.RemoveObservation(landmark, seen);
+    });
+    (void)editor.Finish({kNum - 1});
+  }
   const Map& map() const { return planted_.map(); }
 
   SyntheticWorld world_{SensorType::kStereo};
@@ -71,6 +85,47 @@ TEST_F(KeyframeCulling, KeyframesThatClosedALoopStay) {
   EXPECT_EQ(Left(), (std::vector<int64_t>{0, 2, 5, 7, 8, 9}));
 }
 
+// Keyframes from `begin` on are another visit: their frames are counted anew.
+std::function<void(int64_t, FeatureFrame&)> VisitsBeginningAt(int64_t begin) {
+  return [begin](int64_t k, FeatureFrame& features) { features.frame = {k < begin ? k : k - begin}; };
+}
+
+// Twenty observers are nowhere: what is redundant is so because an earlier visit knows it.
+TEST_F(KeyframeCulling, KeyframesOfAFurtherVisitGoWhereAnEarlierOneKnowsThePlace) {
+  Plant(VisitsBeginningAt(5));
+  Cull({.redundant_observers = 20});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 1, 2, 3, 4, 7, 8, 9}));
+}
+
+TEST_F(KeyframeCulling, KeyframesOfTheFirstVisitStayWhateverALaterOneSees) {
+  Plant(VisitsBeginningAt(3));
+  Cull({.redundant_observers = 4});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 1, 2, 7, 8, 9})) << "of 0 .. 2 each has two others in its visit";
+}
+
+TEST_F(KeyframeCulling, KeyframesOfAnUnknownPlaceStayInAFurtherVisit) {
+  Plant(VisitsBeginningAt(3));
+  ForgetInFirstVisit([](LandmarkId landmark) { return landmark.value % 3 != 0; });
+  Cull({.redundant_observers = 20});
+  EXPECT_EQ(Left().size(), 10U) << "a third of its landmarks is known";
+  Cull({.redundant_observers = 20, .known_share = 0.25});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 1, 2, 7, 8, 9}));
+}
+
+// 0 and 1 see even landmarks, 2 and those from 7 on odd ones: what joins them is 3 .. 6.
+TEST_F(KeyframeCulling, WhoAloneHoldsItsNeighborsTogetherStays) {
+  Plant(VisitsBeginningAt(3));
+  MapEditor editor(planted_.map());
+  ForEachObservation([&](LandmarkId landmark, const Observation& seen) {
+    const int64_t k = seen.keyframe.value;
+    if ((k < 2 && landmark.value % 2 == 1) || ((k == 2 || k > 6) && landmark.value % 2 == 0))
+      editor.RemoveObservation(landmark, seen);
+  });
+  (void)editor.Finish({kNum - 1});
+  Cull({.redundant_observers = 20});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 1, 2, 6, 7, 8, 9})) << "one of them is enough";
+}
+
 TEST_F(KeyframeCulling, ChildrenPassToTheParentAndTheRemovedAreRemembered) {
   Plant();
   const Sim3 before = map().FindKeyframe({4})->WorldFromKeyframe();
@@ -83,6 +138,8 @@ TEST_F(KeyframeCulling, ChildrenPassToTheParentAndTheRemovedAreRemembered) {
 TEST(KeyframeCullingOptions, OutOfRangeIsRefused) {
   EXPECT_THAT(KeyframeCullingOptions{}.Check(), IsSuccess());
   EXPECT_THAT(KeyframeCullingOptions{.redundant_share = 0.0}.Check(), IsFailure(HasSubstr("positive")));
+  EXPECT_THAT(KeyframeCullingOptions{.known_share = 0.0}.Check(), IsFailure(HasSubstr("positive")));
+  EXPECT_THAT(KeyframeCullingOptions{.min_tie = 0}.Check(), IsFailure(HasSubstr("positive")));
   EXPECT_THAT(KeyframeCullingOptions{.kept_newest = 0}.Check(), IsFailure(HasSubstr("positive")));
 }
 

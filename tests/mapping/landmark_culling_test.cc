@@ -115,6 +115,14 @@ TEST_F(Confirmation, RemovesWhatTooFewOfTheExpectedKeyframesObserve) {
   EXPECT_NE(editor.map().FindLandmark(seen), nullptr) << "five of about eight";
 }
 
+TEST_F(Confirmation, ThePairThatMadeItDoesNotCount) {
+  MapEditor editor(planted_.map());
+  const LandmarkId by_one = AddChance(3, editor), by_two = AddChance(4, editor);
+  RemoveUnconfirmed({7}, {by_one, by_two}, {.min_seen_share = 0.3}, editor);
+  EXPECT_EQ(editor.map().FindLandmark(by_one), nullptr) << "one of six others, though three of eight";
+  EXPECT_NE(editor.map().FindLandmark(by_two), nullptr) << "two of six others";
+}
+
 TEST_F(Confirmation, AsksOnlyForLandmarksJustCreated) {
   MapEditor editor(planted_.map());
   const LandmarkId chance = AddChance(2, editor);

@@ -81,7 +81,8 @@ double WrongShare(const Map& map, const Drive& drive) {
 
 TEST(Mapper, MonoCorrectsPosesAndFindsTheOtherPoints) {
   SyntheticWorld world(SensorType::kMono, 0.0);
-  Drive drive(world, 0.03, 3);
+  // 2 cm and 4 mrad, 2 px: where a pose is off by more than fusion looks around (3 px), nobody confirms a new point.
+  Drive drive(world, 0.02, 3);
   Mapper mapper({});
   for (int64_t step = 0; step < 12; ++step) {
     KeyframeObservation seen = drive.Next(step);
