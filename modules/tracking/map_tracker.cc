@@ -10,7 +10,6 @@
 #include "measurement/landmark_description.h"
 #include "tracking/local_points.h"
 #include "tracking/pair_points.h"
-#include "tracking/pose_covariance.h"
 
 namespace tessera {
 namespace {
@@ -23,6 +22,17 @@ constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
+
+// `are_shared`: other frames may see the same points.
+PoseInfluences ByPoint(PoseInfluences influences, bool are_shared) {
+  for (PointInfluence& influence : influences) {
+    if (!are_shared) influence.point = {};
+  }
+  if (!std::ranges::is_sorted(influences, {}, &PointInfluence::point)) {
+    std::ranges::stable_sort(influences, {}, &PointInfluence::point);
+  }
+  return influences;
+}
 
 // A point as one view alone knows it, in the frame of its camera. `covariance`: of the point, if its depth isn't known
 // by the view itself.
@@ -224,6 +234,10 @@ void MapTracker::TakeOverMotion(MonoStart& start) {
 // The map may have changed: the last frame keeps its pose relative to its reference, and its points move with the map.
 void MapTracker::UpdateLast() {
   decision_.Renew(replica_);
+  if (reference_influences_) {
+    for (PointInfluence& influence : *reference_influences_) influence.point = replica_.Renew(influence.point);
+    *reference_influences_ = ByPoint(std::move(*reference_influences_), true);
+  }
   if (const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_)) {
     last_->frame.world_from_camera = (*world_from_reference * last_->reference_from_camera).Pose();
   }
@@ -407,7 +421,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
   reference_ = answer.reference;
   reference_frame_.reset();
-  reference_covariance_.reset();
+  reference_influences_.reset();
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
   ResetMotion();
@@ -432,19 +446,19 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
   LearnReadout(frame);
   lost_since_us_.reset();
-  const std::optional<Matrix6d> own_covariance = PoseCovariance(replica_.map(), frame);
-  const std::optional<Matrix6d> pose_covariance = CovarianceFromReference(frame, own_covariance);
+  std::optional<PoseInfluences> influences = InfluencesOn(frame);
+  const std::optional<Matrix6d> pose_covariance = CovarianceFromReference(frame, influences);
   last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, is_wide_step,
-                     own_covariance, pose_covariance});
+                     std::move(influences), pose_covariance});
 }
 
 // Both ends of the way are as uncertain as their own frames' points leave them.
 std::optional<Matrix6d> MapTracker::CovarianceFromReference(const TrackedFrame& frame,
-                                                            const std::optional<Matrix6d>& own) {
-  if (!own) return std::nullopt;
-  if (!reference_covariance_) reference_covariance_ = own;
-  const Matrix6d adjoint = AdjointOf(frame.world_from_camera.Inverse() * WorldFromReference().Pose());
-  return *own + adjoint * *reference_covariance_ * adjoint.transpose();
+                                                            const std::optional<PoseInfluences>& influences) {
+  if (!influences) return std::nullopt;
+  if (!reference_influences_) reference_influences_ = ByPoint(*influences, false);
+  return WayCovariance(*reference_influences_, *influences,
+                       frame.world_from_camera.Inverse() * WorldFromReference().Pose());
 }
 
 void MapTracker::LearnReadout(const TrackedFrame& frame) {
@@ -512,6 +526,17 @@ MotionPrior MapTracker::ExpectFrom(KeyframeId reference, const Rigid3& reference
   return {motion->last_from_current.translation, 0.5 * (information + information.transpose())};
 }
 
+// Of a frame that becomes the reference; nullopt: nothing is known of its error. Points of the first one with depth
+// stand where it sees them. What two frames have from points that both see cancels between them, if the points err each
+// by itself: those of mono were triangulated by a few keyframes and move with these all together, which residuals don't
+// show. There, both errors count in full.
+std::optional<PoseInfluences> MapTracker::InfluencesOnReference(const TrackedFrame& frame, KeyframeId reference) const {
+  const bool has_depth = frame.view->baseline_m() > 0.0;
+  if (has_depth && !reference.valid()) return PoseInfluences{};
+  if (!last_ || &last_->frame != &frame || !last_->influences) return std::nullopt;
+  return ByPoint(*last_->influences, has_depth);
+}
+
 // The frame becomes the reference of those to come.
 KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId reference,
                                              const Rigid3& reference_from_camera) {
@@ -542,7 +567,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
   reference_ = keyframe.id;
-  reference_covariance_ = last_ && &last_->frame == &frame ? last_->own_covariance : std::nullopt;
+  reference_influences_ = InfluencesOnReference(frame, reference);
   if (frame.view->baseline_m() == 0.0) reference_frame_ = frame;
   camera_motion_at_reference_ = camera_motion_;
   ++next_keyframe_.value;

@@ -22,6 +22,7 @@
 #include "tracking/keyframe_decision.h"
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
+#include "tracking/pose_covariance.h"
 #include "tracking/readout_estimator.h"
 #include "tracking/scale_watch.h"
 
@@ -90,9 +91,8 @@ class MapTracker {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    // of the camera's center, in its axes and those units
     std::optional<CameraMotion> mean_motion = std::nullopt;  // since the frame before, in units of the world
     bool is_wide_step = false;                               // FoundFrame::is_wide
-    std::optional<Matrix6d> own_covariance = std::nullopt;   // PoseCovariance
-    std::optional<Matrix6d> pose_covariance =
-        std::nullopt;  // with that of the reference: of the way from there to here
+    std::optional<PoseInfluences> influences = std::nullopt;
+    std::optional<Matrix6d> pose_covariance = std::nullopt;  // of the way from the reference to here
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -138,10 +138,12 @@ class MapTracker {
   void WatchScale(const Rigid3& reference_from_camera);
   bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
-  std::optional<Matrix6d> CovarianceFromReference(const TrackedFrame& frame, const std::optional<Matrix6d>& own);
+  std::optional<Matrix6d> CovarianceFromReference(const TrackedFrame& frame,
+                                                  const std::optional<PoseInfluences>& influences);
   void Remember(TrackedFrame frame, const FramePose& pose, bool is_wide_step);
   bool NoteLoss(int64_t utime_us);
   bool IsKeyframeDue();
+  std::optional<PoseInfluences> InfluencesOnReference(const TrackedFrame& frame, KeyframeId reference) const;
   KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
   void AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
   void AddPairPoints(TrackedFrame& frame, KeyframeObservation& keyframe, SentKeyframe& sent) const;
@@ -158,7 +160,8 @@ class MapTracker {
   std::optional<CameraMotion> camera_motion_at_reference_;  // likewise
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
-  std::optional<Matrix6d> reference_covariance_;  // its own, or that of the first frame tracked from it
+  // By point: its own, or those of the first frame tracked from it.
+  std::optional<PoseInfluences> reference_influences_;
   std::optional<TrackedFrame>
       reference_frame_;            // mono: as it was when it became a keyframe; nullopt: it is the map's alone
   Rigid3 world_from_start_;        // camera where the next part of the map begins

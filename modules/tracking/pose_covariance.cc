@@ -4,9 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <utility>
 
-#include "geometry/keypoint_noise.h"
+#include "geometry/pose_optimization.h"
 #include "geometry/reprojection.h"
 
 namespace tessera {
@@ -18,29 +18,53 @@ constexpr double kCell_px = 32.0;  // the width of a descriptor's patch on the f
 constexpr int kDegreesOfFreedom = 6;
 constexpr int kMinCells = 2 * kDegreesOfFreedom;
 
-// P, in the camera's axes.
-Eigen::Matrix3d CovarianceOf(const Map& map, const SeenPoint& point, const Eigen::Matrix3d& camera_from_world,
-                             double focal_length_px) {
-  const Landmark& landmark = point.landmark;
-  const size_t num_observers = std::max<size_t>(1, map.ObservationsOf(point.id.landmark).size());
-  // max_distance is the distance times the scale of the level where it was seen last.
-  const double sigma_across = kKeypointSigmaPx * landmark.max_distance / focal_length_px;
-  const double variance_across = sigma_across * sigma_across / static_cast<double>(num_observers);
-  const Eigen::Vector3d normal = camera_from_world * landmark.normal;
-  const double variance_along = landmark.depth_sigma * landmark.depth_sigma;
-  return variance_across * Eigen::Matrix3d::Identity() +
-         (variance_along - variance_across) * normal * normal.transpose();
+// What pose optimization makes of a point.
+struct Term {
+  Eigen::Matrix<double, 3, kDegreesOfFreedom> by_pose;
+  Eigen::Matrix3d weight;
+
+  Matrix6d Information() const { return by_pose.transpose() * weight * by_pose; }
+};
+
+// Bounds the points' leverage, given what all of them know.
+Matrix6d BoundLeverage(const Matrix6d& information, std::vector<Term>& terms) {
+  const Eigen::Matrix3d known_translation = information.topLeftCorner<3, 3>().inverse();
+  const double max_leverage = std::max(kMaxLeverage, 3.0 / static_cast<double>(terms.size()));
+  Matrix6d bounded = Matrix6d::Zero();
+  for (Term& term : terms) {
+    const Matrix6d own = term.Information();
+    const double leverage = (known_translation * own.topLeftCorner<3, 3>()).trace() / 3.0;
+    const double bound = leverage > max_leverage ? max_leverage / leverage : 1.0;
+    term.weight *= bound;
+    bounded += bound * own;
+  }
+  return bounded;
+}
+
+size_t NumCells(const PoseInfluences& influences) {
+  int num = 0;
+  for (const PointInfluence& influence : influences) num = std::max(num, influence.cell + 1);
+  return Index(num);
+}
+
+Matrix6d SumOfSquares(const std::vector<Vector6d>& vectors) {
+  Matrix6d sum = Matrix6d::Zero();
+  for (const Vector6d& vector : vectors) sum += vector * vector.transpose();
+  return sum;
 }
 
 }  // namespace
 
-std::optional<Matrix6d> PoseCovariance(const Map& map, const TrackedFrame& frame) {
+std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame) {
   const CameraCalibration& camera = frame.view->calibration();
   const Rigid3 camera_from_world = frame.world_from_camera.Inverse();
   const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
   const int num_columns = static_cast<int>(camera.width_px / kCell_px) + 1;
   const int num_rows = static_cast<int>(camera.height_px / kCell_px) + 1;
-  std::vector<std::optional<Vector6d>> scores(static_cast<size_t>(num_columns) * static_cast<size_t>(num_rows));
+  std::vector<char> is_covered(Index(num_columns * num_rows));
+  PoseInfluences influences;
+  std::vector<Term> terms;
+  std::vector<Eigen::Vector3d> residuals;
   Matrix6d information = Matrix6d::Zero();
   for (size_t i = 0; i < frame.points.size(); ++i) {
     if (!frame.points[i].valid()) continue;
@@ -48,31 +72,57 @@ std::optional<Matrix6d> PoseCovariance(const Map& map, const TrackedFrame& frame
     if (point.z() < kMinDepth) continue;
     const PixelObservation seen = frame.view->observation(static_cast<int>(i));
     const Reprojection at = Reproject(camera, frame.view->baseline_m(), point, seen);
-    const Eigen::Matrix3d of_point = CovarianceOf(map, frame.points[i], rotation, camera.fx_px);
-    const Eigen::Matrix3d weight =
-        (Eigen::Matrix3d::Identity() + at.by_point * of_point * at.by_point.transpose()).inverse();
-    Eigen::Matrix<double, 3, kDegreesOfFreedom> by_pose;  // the point moves by  -translation + point x rotation
-    by_pose << -at.by_point, at.by_point * Skew(point);
-    information += by_pose.transpose() * weight * by_pose;
+    const Landmark& landmark = frame.points[i].landmark;
+    const Eigen::Vector3d by_depth = at.by_point * (rotation * (landmark.depth_sigma * landmark.normal));
+    Term term;  // the point moves by  -translation + point x rotation
+    term.by_pose << -at.by_point, at.by_point * Skew(point);
+    term.weight = Eigen::Matrix3d::Identity() - by_depth * by_depth.transpose() / (1.0 + by_depth.squaredNorm());
+    information += term.Information();
+    terms.push_back(term);
+    residuals.push_back(at.residual);
     const int column = std::clamp(static_cast<int>(seen.pixel_px.x() / kCell_px), 0, num_columns - 1);
     const int row = std::clamp(static_cast<int>(seen.pixel_px.y() / kCell_px), 0, num_rows - 1);
-    std::optional<Vector6d>& score = scores[static_cast<size_t>(num_columns * row + column)];
-    if (!score) score = Vector6d::Zero();
-    *score += by_pose.transpose() * weight * at.residual;
+    const int cell = num_columns * row + column;
+    is_covered[Index(cell)] = 1;
+    influences.push_back({frame.points[i].id, cell, Vector6d::Zero()});
   }
-  Matrix6d spread = Matrix6d::Zero();
-  int num_cells = 0;
-  for (const std::optional<Vector6d>& score : scores) {
-    if (!score) continue;
-    spread += *score * score->transpose();
-    ++num_cells;
-  }
-  const Eigen::LLT<Matrix6d> factor(information);
+  if (terms.empty()) return std::nullopt;
+  const auto num_cells = static_cast<double>(std::count(is_covered.begin(), is_covered.end(), 1));
+  const Eigen::LLT<Matrix6d> factor(BoundLeverage(information, terms));
   if (num_cells < kMinCells || factor.info() != Eigen::Success) return std::nullopt;
-  const Matrix6d inverse = factor.solve(Matrix6d::Identity());
-  const Matrix6d covariance = inverse * spread * inverse * (num_cells / (num_cells - double{kDegreesOfFreedom}));
-  if (!covariance.allFinite()) return std::nullopt;
-  return 0.5 * (covariance + covariance.transpose());
+  const Matrix6d moved_by_score =
+      -std::sqrt(num_cells / (num_cells - kDegreesOfFreedom)) * factor.solve(Matrix6d::Identity());
+  if (!moved_by_score.allFinite()) return std::nullopt;
+  for (size_t i = 0; i < terms.size(); ++i) {
+    influences[i].moves_by = moved_by_score * (terms[i].by_pose.transpose() * (terms[i].weight * residuals[i]));
+  }
+  return influences;
+}
+
+Matrix6d PoseCovariance(const PoseInfluences& influences) {
+  std::vector<Vector6d> by_cell(NumCells(influences), Vector6d::Zero());
+  for (const PointInfluence& influence : influences) by_cell[Index(influence.cell)] += influence.moves_by;
+  return SumOfSquares(by_cell);
+}
+
+Matrix6d WayCovariance(const PoseInfluences& reference, const PoseInfluences& frame,
+                       const Rigid3& frame_from_reference) {
+  // What the reference has from points that the frame sees counts in the frame's cells.
+  std::vector<Vector6d> by_cell(NumCells(frame), Vector6d::Zero()), shared(by_cell);
+  std::vector<Vector6d> rest(NumCells(reference), Vector6d::Zero());
+  for (const PointInfluence& influence : reference) rest[Index(influence.cell)] += influence.moves_by;
+  std::vector<char> is_shared(reference.size());
+  for (const PointInfluence& influence : frame) {
+    by_cell[Index(influence.cell)] += influence.moves_by;
+    const auto found = std::ranges::lower_bound(reference, influence.point, {}, &PointInfluence::point);
+    if (found == reference.end() || found->point != influence.point || !influence.point.valid()) continue;
+    if (std::exchange(is_shared[static_cast<size_t>(found - reference.begin())], 1) != 0) continue;
+    shared[Index(influence.cell)] += found->moves_by;
+    rest[Index(found->cell)] -= found->moves_by;
+  }
+  const Matrix6d adjoint = AdjointOf(frame_from_reference);
+  for (size_t cell = 0; cell < by_cell.size(); ++cell) by_cell[cell] -= adjoint * shared[cell];
+  return SumOfSquares(by_cell) + adjoint * SumOfSquares(rest) * adjoint.transpose();
 }
 
 }  // namespace tessera

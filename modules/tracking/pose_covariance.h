@@ -3,25 +3,45 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "geometry/body_state.h"
-#include "map/map.h"
 #include "matching/point_matching.h"
 
 namespace tessera {
 
+// What the error of one point that a frame sees, and of where it sees it, does to the frame's pose.
+struct PointInfluence {
+  PointId point;                         // invalid: another one than any other frame sees
+  int cell = 0;                          // of the image
+  Eigen::Matrix<double, 6, 1> moves_by;  // delta in  true pose = world_from_camera * Exp(delta)
+};
+
 // Of delta in  world_from_camera * Exp(delta), (translation, rotation) in the camera's axes and units of the world,
-// against the points that the frame sees:
+// against the points that the frame sees. To first order, point i moves the pose by
 //
-//   covariance = H^-1 (sum over cells g of s_g s_g') H^-1 * G / (G - 6)
-//   H = sum_i J_i' W_i J_i,   s_g = sum over points i in g of J_i' W_i r_i,   W_i = (I + D_i P_i D_i')^-1
+//   d_i = -H^-1 J_i' W_i r_i * sqrt(G / (G - 6)),   H = sum_i J_i' W_i J_i,   W_i = (I + D_i P_i D_i')^-1
 //
-// r_i: the whitened residual, J_i and D_i: its derivatives by pose and point; P_i: the point's own covariance
-// (depth_sigma along its normal; across it, a keypoint's noise over the root of the number of observers). The residuals
-// themselves say how noisy keypoints are, on whatever level and however wrong the points may be ("sandwich": H. White,
-// Econometrica 1980), and cells of the image as wide as a patch count as one observation each, since one corner gives
-// keypoints on several levels that err alike (K.-Y. Liang and S. Zeger, Biometrika 1986). G: cells that hold a point.
-// nullopt: fewer than 12 do, or they leave the pose open.
-std::optional<Matrix6d> PoseCovariance(const Map& map, const TrackedFrame& frame);
+// r_i: the whitened residual, J_i and D_i: its derivatives by pose and point; P_i: the point's covariance, depth_sigma
+// along its normal; G: cells of the image, as wide as a patch, that hold a point. W_i and the bound on its leverage are
+// those of pose optimization, whose error this is. nullopt: fewer than 12 cells do, or they leave the pose open.
+using PoseInfluences = std::vector<PointInfluence>;
+std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame);
+
+// The residuals themselves say how noisy keypoints are, on whatever level and however wrong the points may be
+// ("sandwich": H. White, Econometrica 1980), and each cell counts as one observation, since one corner gives keypoints
+// on several levels that err alike (K.-Y. Liang and S. Zeger, Biometrika 1986):
+//
+//   covariance = sum over cells g of (sum_i in g of d_i) (...)'
+Matrix6d PoseCovariance(const PoseInfluences& influences);
+
+// The same of the way between two frames, of which both poses err: delta in  reference_from_frame * Exp(delta). What
+// both have from a point that both see is one error, of which the way has the difference:
+//
+//   d_i = d_i (frame) - Ad d_i (reference),   Ad: of frame_from_reference
+//
+// `reference` must be sorted by point.
+Matrix6d WayCovariance(const PoseInfluences& reference, const PoseInfluences& frame,
+                       const Rigid3& frame_from_reference);
 
 }  // namespace tessera

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "matching/frame_pose.h"
@@ -46,7 +48,14 @@ TrackedFrame Blurred(const SyntheticWorld& world, const TrackedFrame& frame, dou
   return blurred;
 }
 
-// Mean over draws of e' covariance^-1 e: 6 if the covariance is true.
+// e' covariance^-1 e, of an estimate that is off by e.
+double Nees(const Rigid3& true_from_estimate, const Matrix6d& covariance) {
+  Vector6d e;
+  e << true_from_estimate.translation, LogSO3(true_from_estimate.rotation);
+  return e.dot(covariance.ldlt().solve(e));
+}
+
+// Its mean over draws: 6 if the covariance is true.
 double MeanNees(double sigma_px, size_t num_alike) {
   SyntheticWorld world(SensorType::kMono, 0.0, 600 * num_alike);
   const TrackedFrame exact = world.TrackedAt(3);
@@ -55,12 +64,41 @@ double MeanNees(double sigma_px, size_t num_alike) {
   for (int draw = 0; draw < kNumDraws; ++draw) {
     TrackedFrame frame = Blurred(world, exact, sigma_px, num_alike, generator);
     EXPECT_GT(OptimizeFrame({}, frame), 50);
-    const std::optional<Matrix6d> covariance = PoseCovariance(Map(), frame);
-    if (!covariance) return NAN;
-    const Rigid3 difference = frame.world_from_camera.Inverse() * exact.world_from_camera;
-    Vector6d e;
-    e << difference.translation, LogSO3(difference.rotation);
-    sum += e.dot(covariance->ldlt().solve(e));
+    const std::optional<PoseInfluences> influences = InfluencesOn(frame);
+    if (!influences) return NAN;
+    sum += Nees(frame.world_from_camera.Inverse() * exact.world_from_camera, PoseCovariance(*influences));
+  }
+  return sum / kNumDraws;
+}
+
+// Of the way between two frames, whose points are where the map wrongly has them. `knows`: that they are the same.
+double MeanNeesOfWay(bool knows) {
+  SyntheticWorld world(SensorType::kMono, 0.0, 1200);
+  const TrackedFrame first = world.TrackedAt(3), second = world.TrackedAt(4);
+  const Rigid3 true_way = first.world_from_camera.Inverse() * second.world_from_camera;
+  std::mt19937_64 generator(6);
+  std::normal_distribution<double> normal(0.0, 0.004);  // m
+  double sum = 0.0;
+  for (int draw = 0; draw < kNumDraws; ++draw) {
+    std::map<PointId, Eigen::Vector3d> errors;
+    const auto localize = [&](const TrackedFrame& exact) {
+      TrackedFrame frame = Blurred(world, exact, 0.1, 1, generator);
+      for (SeenPoint& point : frame.points) {
+        if (!point.valid()) continue;
+        const auto [error, is_new] = errors.try_emplace(point.id);
+        if (is_new) error->second = {normal(generator), normal(generator), normal(generator)};
+        point.landmark.position_in_world += error->second;
+      }
+      EXPECT_GT(OptimizeFrame({}, frame), 50);
+      return frame;
+    };
+    const TrackedFrame reference = localize(first), frame = localize(second);
+    std::optional<PoseInfluences> on_reference = InfluencesOn(reference), on_frame = InfluencesOn(frame);
+    if (!on_reference || !on_frame) return NAN;
+    for (PointInfluence& influence : *on_reference) influence.point = knows ? influence.point : PointId{};
+    std::ranges::stable_sort(*on_reference, {}, &PointInfluence::point);
+    const Rigid3 way = reference.world_from_camera.Inverse() * frame.world_from_camera;
+    sum += Nees(way.Inverse() * true_way, WayCovariance(*on_reference, *on_frame, way.Inverse()));
   }
   return sum / kNumDraws;
 }
@@ -74,12 +112,17 @@ TEST(PoseCovariance, LearnsTheNoiseFromTheResiduals) { EXPECT_NEAR(MeanNees(0.1,
 
 TEST(PoseCovariance, CountsKeypointsOfOneCornerOnce) { EXPECT_NEAR(MeanNees(0.5, 4), 6.0, kBand); }
 
+TEST(PoseCovariance, ErrorsThatBothEndsOfAWayShareCancel) {
+  EXPECT_NEAR(MeanNeesOfWay(true), 6.0, kBand);
+  EXPECT_LT(MeanNeesOfWay(false), 6.0 - kBand) << "too careful";
+}
+
 TEST(PoseCovariance, SaysNothingOfAFewPoints) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
   TrackedFrame frame = world.TrackedAt(3);
-  EXPECT_TRUE(PoseCovariance(Map(), frame));
+  EXPECT_TRUE(InfluencesOn(frame));
   for (size_t i = 8; i < frame.points.size(); ++i) frame.points[i] = {};
-  EXPECT_FALSE(PoseCovariance(Map(), frame));
+  EXPECT_FALSE(InfluencesOn(frame));
 }
 
 }  // namespace
