@@ -47,6 +47,11 @@ CameraSession::State CameraSession::Look(int64_t now_us) {
   return pacer_.MayGo(next_->utime_us, now_us) ? State::kReady : State::kWaits;
 }
 
+std::optional<int64_t> CameraSession::NextLookUs(int64_t now_us) const {
+  if (source_->is_live()) return now_us + kLookAtLiveUs;
+  return next_ ? pacer_.DueUs(next_->utime_us) : std::nullopt;
+}
+
 void CameraSession::PassOverTracked() {
   if (source_->is_live()) {
     renumbering_.MoveBehind(tracked_, tracked_utime_us_, *next_);

@@ -49,6 +49,9 @@ class CameraSession {
   std::vector<std::string> TakeEvents() { return source_->TakeEvents(); }
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
+  // When the state may have changed without anything received, if it may: a timed frame is due then; nothing says that
+  // a frame of a live source has come.
+  std::optional<int64_t> NextLookUs(int64_t now_us) const;
   // Takes the step of the state that Look() just told; none where the camera waits or has ended.
   CameraActions Advance(int64_t now_us);
   // Ends the stream, here if need be; nothing if it has ended.
@@ -59,6 +62,8 @@ class CameraSession {
   int num_ahead() const { return pacer_.num_ahead(); }
   int64_t num_sent() const { return num_sent_; }
 
+  // Small against the time between two images of any camera.
+  static constexpr int64_t kLookAtLiveUs = 2'000;
   // Without a pose for this long, lockstep asks for help: the slowest pipeline tracks a frame in less.
   static constexpr int64_t kNoPoseUs = 10'000'000;
   // No pipeline has so many frames in it.

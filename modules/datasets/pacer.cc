@@ -38,15 +38,17 @@ bool Pacer::MayGo(int64_t utime_us, int64_t now_us) {
   if (!start_) {
     start_ = Start{utime_us, now_us};
   }
-  // due - start = (utime - first utime) / speed
-  return static_cast<double>(now_us - start_->now_us) * options_.speed >=
-         static_cast<double>(utime_us - start_->utime_us);
+  return now_us >= *DueUs(utime_us);
+}
+
+// due - start = (utime - first utime) / speed
+std::optional<int64_t> Pacer::DueUs(int64_t utime_us) const {
+  if (options_.kind != PacerOptions::Kind::kTimed || !start_) return std::nullopt;
+  return start_->now_us + std::llround(static_cast<double>(utime_us - start_->utime_us) / options_.speed);
 }
 
 int64_t Pacer::LatenessUs(int64_t utime_us, int64_t now_us) const {
-  if (options_.kind != PacerOptions::Kind::kTimed || !start_) return 0;
-  const double due_us = static_cast<double>(utime_us - start_->utime_us) / options_.speed;
-  return std::max<int64_t>(0, now_us - start_->now_us - std::llround(due_us));
+  return std::max<int64_t>(0, now_us - DueUs(utime_us).value_or(now_us));
 }
 
 void Pacer::MarkSent(FrameId frame) {

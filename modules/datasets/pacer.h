@@ -30,6 +30,8 @@ class Pacer {
 
   // Whether the frame taken at `utime_us` may be sent. The first call starts the clock of kTimed.
   bool MayGo(int64_t utime_us, int64_t now_us);
+  // When time alone lets it go; nothing if that is not what it waits for.
+  std::optional<int64_t> DueUs(int64_t utime_us) const;
   // How long ago the clock of kTimed reached `utime_us`, which MayGo() let go: a camera would have taken it then. 0 of
   // the others, whose frames are as new as they come.
   int64_t LatenessUs(int64_t utime_us, int64_t now_us) const;

@@ -1,6 +1,7 @@
 #include "distribution/dispatcher_session.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace tessera {
 namespace {
@@ -25,9 +26,8 @@ void DispatcherSession::Receive(const CameraCalibration& calibration) {
 
 // A program that was started again counts from 0 again: it is continued behind what came before, by the time that has
 // passed here.
-CameraFrame DispatcherSession::Continued(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us) {
-  CameraFrame continued = frame;
-  if (!options_.renumbers) return continued;
+void DispatcherSession::Continue(CameraFrame& frame, const FrameArrival& arrival, int64_t now_us) {
+  if (!options_.renumbers) return;
   const bool is_other = newest_.valid() && arrival.camera_epoch_us != last_camera_epoch_us_;
   last_camera_epoch_us_ = arrival.camera_epoch_us;
   if (is_other && frame.id.value + number_offset_ <= newest_.value) {
@@ -38,13 +38,12 @@ CameraFrame DispatcherSession::Continued(const CameraFrame& frame, const FrameAr
   if (is_other && frame.utime_us + time_offset_us_ <= newest_utime_us_) {
     time_offset_us_ = newest_utime_us_ + std::max<int64_t>(1, now_us - last_frame_us_) - frame.utime_us;
   }
-  continued.id.value += number_offset_;
-  continued.utime_us += time_offset_us_;
-  return continued;
+  frame.id.value += number_offset_;
+  frame.utime_us += time_offset_us_;
 }
 
-void DispatcherSession::Receive(const CameraFrame& sent, const FrameArrival& arrival, int64_t now_us) {
-  const CameraFrame frame = Continued(sent, arrival, now_us);
+void DispatcherSession::Receive(CameraFrame frame, const FrameArrival& arrival, int64_t now_us) {
+  Continue(frame, arrival, now_us);
   if (Watches()) ReportIfAny(source_watch_.NoteFrame(now_us));
   last_frame_us_ = now_us;
   if (!first_camera_epoch_us_) first_camera_epoch_us_ = arrival.camera_epoch_us;
@@ -68,7 +67,8 @@ void DispatcherSession::Receive(const CameraFrame& sent, const FrameArrival& arr
   const bool is_late = arrival.publish_us < options_.epoch_us;
   if (is_late) newest_late_ = frame.id;
   // A log player repeats the wall clock of its recording.
-  Arrived arrived{frame, is_late ? arrival.arrival_us : arrival.publish_us - frame.age_us, is_late};
+  const int64_t captured_us = is_late ? arrival.arrival_us : arrival.publish_us - frame.age_us;
+  Arrived arrived{std::move(frame), captured_us, is_late};
   if (calibration_) {
     Queue(std::move(arrived));
   } else {

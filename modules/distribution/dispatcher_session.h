@@ -51,7 +51,7 @@ class DispatcherSession {
       : options_(options), queue_(options.queue), source_watch_(options.give_up_us) {}
 
   void Receive(const CameraCalibration& calibration);
-  void Receive(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us);
+  void Receive(CameraFrame frame, const FrameArrival& arrival, int64_t now_us);
   void Receive(const ExtractorReady& ready, int64_t now_us);
   // `reassembler_epoch_us`: when the reassembler that has the tiles was started. What it had is lost with it: a new one
   // is given everything again.
@@ -96,7 +96,7 @@ class DispatcherSession {
   void ReportIfAny(const std::optional<std::string>& sentence) {
     if (sentence) Report(*sentence);
   }
-  CameraFrame Continued(const CameraFrame& frame, const FrameArrival& arrival, int64_t now_us);
+  void Continue(CameraFrame& frame, const FrameArrival& arrival, int64_t now_us);
   void NoteGapBefore(FrameId frame);
   void HoldUntilCalibrated(Arrived arrived);
   void Queue(Arrived arrived);

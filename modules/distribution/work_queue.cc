@@ -162,7 +162,8 @@ void WorkQueue::CheckExtractors(int64_t now_us) {
 void WorkQueue::CutNextFrame() {
   Waiting next = std::move(waiting_.front());
   waiting_.pop_front();
-  std::vector<TileJob> jobs = CutFrame(next.frame, next.calibration, next.captured_us, options_.grid,
+  untracked_.insert(next.frame.id);
+  std::vector<TileJob> jobs = CutFrame(std::move(next.frame), next.calibration, next.captured_us, options_.grid,
                                        options_.coarse_levels_from, options_.features);
   for (TileJob& job : jobs) {
     if (jobs.size() > 1) job.min_priority = min_priority_;
@@ -172,7 +173,6 @@ void WorkQueue::CutNextFrame() {
     ++num_open_;
     to_give_.push_back(key);
   }
-  untracked_.insert(next.frame.id);
 }
 
 // The extractor with the fewest jobs among those with room; then the one that waits longest; then the lowest id.

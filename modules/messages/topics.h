@@ -23,7 +23,7 @@ enum class BusKind {
   kMain,    // everything small. All processes listen. The stock tools' default
   kCamera,  // CAMERA. Only the dispatcher, the recorder and the occupancy stage listen
   kWork,    // TILE_FEATURES. Only the reassembler and the recorder listen
-  kMap,     // FEATURES, keyframes, the map. Extractors don't listen. The main bus unless bus.map_url is set
+  kMap,     // FEATURES, keyframes, the map. What handles images doesn't listen. The main bus unless bus.map_url is set
   kTile,    // TILE_<n>: one bus for each extractor, which alone listens
 };
 

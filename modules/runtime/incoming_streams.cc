@@ -13,6 +13,8 @@ bool IsOneOf(const WireType* type, std::initializer_list<const char*> names) {
          std::any_of(names.begin(), names.end(), [&](const char* name) { return type->name() == name; });
 }
 
+bool HasNoOrder(const WireType* type) { return IsOneOf(type, {"extractor_ready_t", "stage_status_t"}); }
+
 // What a camera, or a log player in its place, sends.
 bool IsSentByCameras(const std::string& channel) {
   return channel == kCamera.name || channel == kCalibration.name || channel == kGroundTruth.name ||
@@ -48,7 +50,7 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   if (channel.delivery == Delivery::kUnordered) {
     subscription->sink = std::move(sink);
   } else {
-    StreamReceiverOptions options = settings_.receiver;
+    StreamReceiverOptions options = settings_.ReceiverOf(channel.bus);
     options.starts_now = channel.delivery == Delivery::kFromNow;
     options.discards_at_restart = true;  // a frame behind a missing one would be taken for the next
     subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
@@ -160,11 +162,18 @@ void IncomingStreams::OnRaw(const std::string& full_channel, ByteView message, i
   if (!header) return raw_handler_(full_channel, message, arrival_us);
   const std::string channel = full_channel.substr(settings_.channel_prefix.size());
   if (SenderOf(channel, message) == Sender::kStranger) return PassOver(channel);
-  if (IsOneOf(type, {"extractor_ready_t", "stage_status_t"})) return raw_handler_(full_channel, message, arrival_us);
+  if (HasNoOrder(type)) return raw_handler_(full_channel, message, arrival_us);
   ChannelReceiver* receiver = RawReceiver(channel);
   if (receiver == nullptr || !receiver->OnMessage(*header, message, arrival_us, clock_.NowUs())) {
     raw_handler_(full_channel, message, arrival_us);
   }
+}
+
+void IncomingStreams::ContinueRawBehind(const std::string& full_channel, ByteView front) {
+  if (!full_channel.starts_with(settings_.channel_prefix) || HasNoOrder(WireType::Of(front))) return;
+  const auto header = ReadHeaderOfFront(front);
+  ChannelReceiver* receiver = header ? RawReceiver(full_channel.substr(settings_.channel_prefix.size())) : nullptr;
+  if (receiver != nullptr) receiver->ContinueBehind(*header, clock_.NowUs());
 }
 
 ChannelReceiver* IncomingStreams::RawReceiver(const std::string& channel) {

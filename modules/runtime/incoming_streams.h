@@ -38,6 +38,8 @@ class IncomingStreams {
   using RawHandler = std::function<void(const std::string& channel, ByteView message, int64_t arrival_us)>;
   void SetRawHandler(RawHandler handler) { raw_handler_ = std::move(handler); }
   void AddAll(const std::shared_ptr<Bus>& bus);
+  // An earlier life took this message (`channel` with prefix; the front is enough): its stream continues behind it.
+  void ContinueRawBehind(const std::string& full_channel, ByteView front);
   bool hears_all() const { return raw_handler_ != nullptr; }
 
   // The recording ends: delivers what waits behind gaps, and reports the gaps.

@@ -1,9 +1,11 @@
 #include "runtime/journal.h"
 
 #include <fcntl.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -28,18 +30,21 @@ struct Head {
 };
 constexpr size_t kMinBytes = sizeof(int64_t) + 1;
 
-Bytes Encode(const std::string& channel, ByteView message, int64_t arrival_us) {
-  Bytes bytes(sizeof(Head) + kMinBytes + channel.size() + message.size());
-  uint8_t* at = bytes.data() + sizeof(Head);
+size_t EntryBytes(const std::string& channel, ByteView message) {
+  return sizeof(Head) + kMinBytes + channel.size() + message.size();
+}
+
+// All of an entry but the message.
+Bytes EncodeFront(const std::string& channel, ByteView message, int64_t arrival_us) {
+  Bytes front(sizeof(Head) + kMinBytes + channel.size());
+  uint8_t* at = front.data() + sizeof(Head);
   std::memcpy(at, &arrival_us, sizeof(arrival_us));
   at[sizeof(arrival_us)] = static_cast<uint8_t>(channel.size());
-  at += kMinBytes;
-  at = std::copy(channel.begin(), channel.end(), at);
-  std::copy(message.begin(), message.end(), at);
-  const ByteView content = ByteView(bytes).subspan(sizeof(Head));
-  const Head head{static_cast<uint32_t>(content.size()), Crc32(content)};
-  std::memcpy(bytes.data(), &head, sizeof(head));
-  return bytes;
+  std::copy(channel.begin(), channel.end(), at + kMinBytes);
+  const ByteView content = ByteView(front).subspan(sizeof(Head));
+  const Head head{static_cast<uint32_t>(content.size() + message.size()), Crc32(message, Crc32(content))};
+  std::memcpy(front.data(), &head, sizeof(head));
+  return front;
 }
 
 std::optional<Journal::Entry> Decode(ByteView content) {
@@ -53,8 +58,14 @@ std::optional<Journal::Entry> Decode(ByteView content) {
   return entry;
 }
 
-bool WriteAll(int file, const Bytes& bytes) {
-  return write(file, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+// In one call, so that an entry is there as a whole or is the last one; the message is written from where it lies.
+bool WriteEntry(int file, const std::string& channel, ByteView message, int64_t arrival_us) {
+  Bytes front = EncodeFront(channel, message, arrival_us);
+  const std::array<iovec, 2> pieces = {
+      iovec{front.data(), front.size()},
+      iovec{const_cast<uint8_t*>(message.data()), message.size()}};  // writev only reads it
+  return writev(file, pieces.data(), static_cast<int>(pieces.size())) ==
+         static_cast<ssize_t>(front.size() + message.size());
 }
 
 [[noreturn]] void ThrowUnusable(const std::string& path) {
@@ -95,11 +106,10 @@ void Journal::Begin(int64_t epoch_us) {
   const std::string part = path_ + ".part";
   const int file = open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   if (file < 0) ThrowUnusable(part);
-  const Bytes title = Encode(std::string(kTitle), {}, epoch_us);
-  const bool is_written = WriteAll(file, title);
+  const bool is_written = WriteEntry(file, std::string(kTitle), {}, epoch_us);
   close(file);
   if (!is_written || std::rename(part.c_str(), path_.c_str()) != 0) ThrowUnusable(path_);
-  num_bytes_ = static_cast<int64_t>(title.size());
+  num_bytes_ = static_cast<int64_t>(EntryBytes(std::string(kTitle), {}));
 }
 
 // nullopt at the end, or where an entry is not whole.
@@ -128,10 +138,9 @@ std::optional<Journal::Entry> Journal::Next() {
 
 Result<> Journal::Append(const std::string& channel, ByteView message, int64_t arrival_us) {
   if (is_lost_) return {};
-  const Bytes bytes = Encode(channel, message, arrival_us);
-  num_bytes_ += static_cast<int64_t>(bytes.size());
+  num_bytes_ += static_cast<int64_t>(EntryBytes(channel, message));
   if (num_bytes_ > max_bytes_) return GiveUp("it would be larger than stream.journal_mb");
-  if (!WriteAll(file_, bytes)) return GiveUp(std::strerror(errno));
+  if (!WriteEntry(file_, channel, message, arrival_us)) return GiveUp(std::strerror(errno));
   return {};
 }
 
@@ -139,7 +148,7 @@ Result<> Journal::Append(const std::string& channel, ByteView message, int64_t a
 Result<> Journal::GiveUp(const std::string& why) {
   is_lost_ = true;
   // An empty file says the same as this title.
-  if (ftruncate(file_, 0) == 0) WriteAll(file_, Encode(std::string(kLostTitle), {}, epoch_us_));
+  if (ftruncate(file_, 0) == 0) WriteEntry(file_, std::string(kLostTitle), {}, epoch_us_);
   return Failed("the journal " + path_ + " is given up (" + why +
                 "): this process may not come back if it is killed from now on");
 }

@@ -16,8 +16,8 @@ constexpr std::chrono::milliseconds kAskAgain{300};
 MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply apply, std::function<void()> on_news)
     : context_(context), apply_(std::move(apply)), on_news_(std::move(on_news)), follower_(joins_late) {
   requests_ = context.Advertise(kMapRequest);
-  context.Subscribe(kMapDelta, [this](const MapDelta& delta) {
-    follower_.Receive(std::make_shared<const MapDelta>(delta));
+  context.Subscribe(kMapDelta, [this](MapDelta delta) {
+    follower_.Receive(std::make_shared<const MapDelta>(std::move(delta)));
     ApplyAll();
   });
   context.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) {

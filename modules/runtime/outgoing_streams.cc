@@ -44,7 +44,8 @@ MessageHeader OutgoingStreams::NextHeader(int stream, int64_t wall_us) const {
 }
 
 size_t OutgoingStreams::MaxMessageBytes(int stream) const {
-  return settings_.max_message_bytes - kLcmHeaderBytes - streams_[static_cast<size_t>(stream)].full_name.size() - 1;
+  const Stream& sent = streams_[static_cast<size_t>(stream)];
+  return settings_.MaxMessageBytes(sent.channel.bus) - kLcmHeaderBytes - sent.full_name.size() - 1;
 }
 
 bool OutgoingStreams::Send(int stream_number, std::vector<Bytes> messages, std::optional<int64_t> source_us) {

@@ -19,6 +19,7 @@ StageContext& StageContext::KeepJournal(const std::vector<Channel>& inputs, cons
 }
 
 bool StageContext::has_lost_journal() const { return engine_.has_lost_journal(); }
+bool StageContext::was_restarted() const { return engine_.has_lost_journal() || engine_.is_replaying(); }
 
 int StageContext::AddStream(const Channel& channel) { return engine_.Advertise(channel); }
 
@@ -34,11 +35,17 @@ void StageContext::AddSubscription(const Channel& channel, const char* type, Mak
 
 void StageContext::SubscribeAll(RawHandler handler) { engine_.SubscribeAll(std::move(handler)); }
 
+void StageContext::ContinueBehind(const std::string& channel, ByteView front) {
+  engine_.incoming_.ContinueRawBehind(channel, front);
+}
+
 void StageContext::Every(std::chrono::milliseconds period, std::function<void()> task) {
   engine_.timers_.push_back({1000 * period.count(), now_us(), std::move(task)});
 }
 
 void StageContext::WhenIdle(std::function<bool()> task) { engine_.idle_tasks_.push_back(std::move(task)); }
+
+void StageContext::WakeAt(int64_t time_us) { engine_.wake_us_ = time_us; }
 
 StageContext& StageContext::JoinRobot(const std::string& channel_prefix) { return engine_.Join(channel_prefix); }
 

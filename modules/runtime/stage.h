@@ -75,6 +75,8 @@ class StageContext {
   StageContext& KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs);
   // This process was started again, and its journal was given up before: it begins with nothing.
   bool has_lost_journal() const;
+  // This process was started again, as one that keeps a journal can tell.
+  bool was_restarted() const;
 
   // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
   // Throws std::runtime_error if the channel may have one publisher only and another process is it.
@@ -83,10 +85,10 @@ class StageContext {
     return {this, AddStream(topic)};
   }
 
-  // `handler` gets every value of every publisher of the channel, per publisher in order and once. It takes the value,
-  // or (value, const MessageInfo&), and returns nothing or a Result<>: a failed one refuses the value, which is then
-  // counted, reported and passed over. Messages that were lost on the way are asked for again; those that do not come
-  // are counted in STATUS, and the stream continues behind them.
+  // `handler` gets every value of every publisher of the channel, per publisher in order and once. It takes the value
+  // (const Value&, or Value to keep it), or (value, const MessageInfo&), and returns nothing or a Result<>: a failed
+  // one refuses the value, which is then counted, reported and passed over. Messages that were lost on the way are
+  // asked for again; those that do not come are counted in STATUS, and the stream continues behind them.
   template <class Value, class Handler>
   void Subscribe(const Topic<Value>& topic, Handler handler) {
     AddSubscription(topic, TypeName<Value>(), MakeReceiverOf<Value>(std::move(handler)));
@@ -97,12 +99,17 @@ class StageContext {
   // again, they would speak of publishers that are gone.
   using RawHandler = std::function<void(const std::string& channel, ByteView message, int64_t arrival_us)>;
   void SubscribeAll(RawHandler handler);
+  // This process was started again, and its earlier life has recorded this message (`channel` with prefix; the first
+  // 256 bytes are enough): its stream continues behind it. To be called before SubscribeAll, in order.
+  void ContinueBehind(const std::string& channel, ByteView front);
 
   // Calls `task` about every `period`. For liveness and output only; no result may depend on it.
   void Every(std::chrono::milliseconds period, std::function<void()> task);
   // Runs `task` whenever no message waits: again at once while it returns true, else after the next message or timer.
   // The main loop of a stage that makes its own work, such as the camera.
   void WhenIdle(std::function<bool()> task);
+  // Idle tasks run at this time of now_us() at the latest, once. A later call replaces it.
+  void WakeAt(int64_t time_us);
 
   // This process under another robot's channel prefix: channels, streams, STATUS, HEARTBEAT and REPAIR of its own, on
   // the same buses, thread and clock. It lives as long as this context. If another process of this name is there

@@ -294,6 +294,7 @@ void StageEngine::RunTimers() {
 
 bool StageEngine::RunIdleTasks() {
   bool again = false;
+  wake_us_ = INT64_MAX;
   for (size_t i = 0; i < idle_tasks_.size() && !stopped_; ++i) {  // by index: a task may add one
     const auto task = idle_tasks_[i];
     CallStage("the stage's own work", [&] { again |= task(); });
@@ -337,7 +338,7 @@ bool StageEngine::Step() {
 }
 
 int64_t StageEngine::NextDueUs() const {
-  int64_t due_us = std::min({heartbeat_due_us_, soon_due_us_, status_due_us_});
+  int64_t due_us = std::min({heartbeat_due_us_, soon_due_us_, status_due_us_, wake_us_});
   for (const Timer& timer : timers_) due_us = std::min(due_us, timer.due_us);
   for (const auto& other : others_) {
     if (!other->is_silent_) due_us = std::min(due_us, other->NextDueUs());
@@ -367,6 +368,7 @@ void StageEngine::ForgetStage() {
   stage_is_gone_ = true;
   timers_.clear();
   idle_tasks_.clear();
+  wake_us_ = INT64_MAX;
   for (const auto& other : others_) other->ForgetStage();
 }
 

@@ -53,6 +53,7 @@ class StageEngine {
   void SubscribeAll(IncomingStreams::RawHandler handler);
   void KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs);
   bool has_lost_journal() const { return journal_ && journal_->is_lost(); }
+  bool is_replaying() const { return journal_ && journal_->is_replaying(); }
   StageContext& Join(const std::string& channel_prefix);
   void ReportError(const std::string& sentence);
   void Fail(const std::string& sentence, int exit_status);
@@ -96,6 +97,7 @@ class StageEngine {
   IncomingStreams incoming_;
   std::vector<Timer> timers_;
   std::vector<std::function<bool()>> idle_tasks_;
+  int64_t wake_us_ = INT64_MAX;  // for them
   StageState state_ = StageState::kStarting;
   bool stopped_ = false;
   bool stage_is_gone_ = false;
@@ -112,7 +114,6 @@ class StageEngine {
   void SendValue(int stream, const Value& value);
   bool is_over() const { return stopped_ || root_->stopped_; }
   bool HandleMessages();
-  bool is_replaying() const { return journal_ && journal_->is_replaying(); }
   void ReplayOne();
   void RunTimers();
   void AskForRepairs();

@@ -5,6 +5,15 @@
 #include "runtime/run_dir.h"
 
 namespace tessera {
+namespace {
+
+// How many messages of this size are asked for at a time: their answer fits the receive buffer.
+int MaxAsked(const StreamSettings& settings, size_t message_bytes) {
+  return std::clamp(settings.receive_buffer_bytes / 4 / static_cast<int>(message_bytes), 8, 512);
+}
+
+}  // namespace
+
 StreamSettings StreamSettings::From(const Settings& settings) {
   const auto bus = settings.Get<BusSettings>();
   const auto stream = settings.Get<StreamTimingSettings>();
@@ -12,6 +21,7 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   result.channel_prefix = bus.channel_prefix;
   result.receive_buffer_bytes = bus.receive_buffer_bytes;
   result.max_message_bytes = static_cast<size_t>(bus.max_message_bytes);
+  result.max_local_message_bytes = static_cast<size_t>(bus.max_local_message_bytes);
   result.history_bytes = static_cast<size_t>(stream.history_bytes);
   result.heartbeat_us = 1000LL * stream.heartbeat_ms;
   StreamReceiverOptions& receiver = result.receiver;
@@ -20,13 +30,23 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   receiver.give_up_silent_us = 10 * receiver.give_up_us;
   receiver.silent_us = std::max<int64_t>(500'000, 5 * result.heartbeat_us);
   receiver.unwatched_us = std::max<int64_t>(300'000, 3 * result.heartbeat_us);
-  receiver.max_asked = std::clamp(result.receive_buffer_bytes / 4 / static_cast<int>(result.max_message_bytes), 8, 512);
+  receiver.max_asked = MaxAsked(result, std::max(result.max_message_bytes, result.max_local_message_bytes));
   receiver.max_waiting_bytes = result.history_bytes;
   result.journal_dir = stream.journal_dir;
   result.journal_bytes = 1'000'000LL * stream.journal_mb;
   if (!bus.run_dir.empty()) result.authenticator = std::make_shared<const Authenticator>(ReadRunSecret(bus.run_dir));
   result.camera_is_member = bus.camera_is_member;
   return result;
+}
+
+size_t StreamSettings::MaxMessageBytes(BusKind bus) const {
+  return bus == BusKind::kCamera || bus == BusKind::kMap ? max_local_message_bytes : max_message_bytes;
+}
+
+StreamReceiverOptions StreamSettings::ReceiverOf(BusKind bus) const {
+  StreamReceiverOptions options = receiver;
+  options.max_asked = MaxAsked(*this, MaxMessageBytes(bus));
+  return options;
 }
 
 }  // namespace tessera

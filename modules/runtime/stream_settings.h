@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "messages/topics.h"
 #include "settings/settings.h"
 #include "streams/authenticator.h"
 #include "streams/stream_receiver.h"
@@ -16,6 +17,7 @@ struct StreamSettings {
   std::string channel_prefix;
   int receive_buffer_bytes = 0;
   size_t max_message_bytes = 0;
+  size_t max_local_message_bytes = 0;  // of the buses of camera and map
   size_t history_bytes = 0;
   int64_t heartbeat_us = 0;
   StreamReceiverOptions receiver;
@@ -26,6 +28,10 @@ struct StreamSettings {
 
   // Throws InputError if the run's secret can't be read.
   static StreamSettings From(const Settings& settings);
+
+  size_t MaxMessageBytes(BusKind bus) const;
+  // How a stream of this bus is received.
+  StreamReceiverOptions ReceiverOf(BusKind bus) const;
 };
 
 }  // namespace tessera

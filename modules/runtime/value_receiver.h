@@ -24,17 +24,18 @@ struct MessageInfo {
 
 // A failed result refuses the value: it is counted, reported and passed over.
 template <class Value>
-using ValueHandler = std::function<Result<>(const Value&, const MessageInfo&)>;
+using ValueHandler = std::function<Result<>(Value&&, const MessageInfo&)>;
 
-// The handler of a stage, which takes the value alone or with its info, and returns nothing or a Result<>.
+// The handler of a stage, which takes the value alone or with its info, and returns nothing or a Result<>. One that
+// keeps the value takes it as a Value, which costs no copy.
 template <class Value, class Handler>
 ValueHandler<Value> MakeValueHandler(Handler handler) {
-  return [handler = std::move(handler)](const Value& value, const MessageInfo& info) mutable -> Result<> {
+  return [handler = std::move(handler)](Value&& value, const MessageInfo& info) mutable -> Result<> {
     const auto call = [&] {
-      if constexpr (std::is_invocable_v<Handler&, const Value&, const MessageInfo&>) {
-        return handler(value, info);
+      if constexpr (std::is_invocable_v<Handler&, Value&&, const MessageInfo&>) {
+        return handler(std::move(value), info);
       } else {
-        return handler(value);
+        return handler(std::move(value));
       }
     };
     if constexpr (std::is_void_v<decltype(call())>) {
@@ -65,7 +66,7 @@ class TypedReceiver : public ValueReceiver {
 
   Result<bool> Receive(ByteView message, const MessageHeader& header, int64_t arrival_us) override {
     if (header.part == 0) arrival_us_ = arrival_us;
-    const Result<const Value*> value = joiner_.Add(message, header);
+    const Result<Value*> value = joiner_.Add(message, header);
     TESSERA_RETURN_IF_FAILED(value);
     if (*value == nullptr) return false;
     if constexpr (std::is_same_v<Value, EndOfStream>) {
@@ -73,11 +74,11 @@ class TypedReceiver : public ValueReceiver {
         return Failed("only the end of the camera's stream may come from outside of the run");
       }
     }
-    TESSERA_RETURN_IF_FAILED((*handler_)(**value, {.publisher = header.publisher,
-                                                   .epoch_us = header.epoch_us,
-                                                   .sequence = header.sequence,
-                                                   .publish_us = header.publish_us,
-                                                   .arrival_us = arrival_us_}));
+    TESSERA_RETURN_IF_FAILED((*handler_)(std::move(**value), {.publisher = header.publisher,
+                                                              .epoch_us = header.epoch_us,
+                                                              .sequence = header.sequence,
+                                                              .publish_us = header.publish_us,
+                                                              .arrival_us = arrival_us_}));
     return true;
   }
   void Interrupt() override { joiner_.Interrupt(); }

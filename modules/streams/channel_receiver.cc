@@ -57,6 +57,10 @@ void ChannelReceiver::Replay(const MessageHeader& header, ByteView message, int6
   }
 }
 
+void ChannelReceiver::ContinueBehind(const MessageHeader& header, int64_t now_us) {
+  if (StreamReceiver* receiver = Find(header.publisher, header.epoch_us)) receiver->ContinueBehind(header, now_us);
+}
+
 std::vector<RepairRequest> ChannelReceiver::Poll(int64_t now_us) {
   std::vector<RepairRequest> requests;
   for (auto& [publisher, stream] : streams_) {

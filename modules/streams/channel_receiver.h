@@ -30,6 +30,8 @@ class ChannelReceiver {
 
   // A message that was delivered in an earlier life, in the order of that time. What comes next continues behind it.
   void Replay(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us);
+  // The messages of its stream up to this one were taken in an earlier life.
+  void ContinueBehind(const MessageHeader& header, int64_t now_us);
 
   // As in StreamReceiver, over all streams.
   std::vector<RepairRequest> Poll(int64_t now_us);

@@ -49,15 +49,19 @@ bool StreamReceiver::OnMessage(const MessageHeader& header, ByteView message, in
 }
 
 void StreamReceiver::Replay(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us) {
-  heartbeat_us_ = now_us;
   const int64_t num_lost = is_started_ ? header.sequence - next_ : 0;
-  is_started_ = true;
-  next_ = head_ = header.sequence + 1;
+  ContinueBehind(header, now_us);
   if (num_lost > 0) {
     counts_.num_lost += num_lost;
     sink_.lose(num_lost);
   }
   sink_.deliver(message, header, arrival_us);
+}
+
+void StreamReceiver::ContinueBehind(const MessageHeader& header, int64_t now_us) {
+  heartbeat_us_ = now_us;
+  is_started_ = true;
+  next_ = head_ = header.sequence + 1;
 }
 
 void StreamReceiver::OnHeartbeat(int64_t first, int64_t next, int64_t now_us) {

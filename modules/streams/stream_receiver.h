@@ -49,6 +49,8 @@ class StreamReceiver {
   // A message that was delivered in an earlier life comes again, before anything else comes: it is delivered, and the
   // stream continues behind it. Its publisher counts as heard.
   void Replay(const MessageHeader& header, ByteView message, int64_t arrival_us, int64_t now_us);
+  // The messages up to this one were taken in an earlier life: the stream continues behind it.
+  void ContinueBehind(const MessageHeader& header, int64_t now_us);
   // The publisher says that it has messages first .. next - 1.
   void OnHeartbeat(int64_t first, int64_t next, int64_t now_us);
 

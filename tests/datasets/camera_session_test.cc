@@ -95,6 +95,19 @@ TEST(CameraSession, LockstepSendsAsFastAsPosesComeBack) {
   EXPECT_EQ(session.num_sent(), 5);
 }
 
+TEST(CameraSession, LooksAgainWhenATimedFrameIsDueAndOftenAtALiveSource) {
+  const auto next_look = [](bool is_live, PacerOptions::Kind kind) {
+    CameraSession session(std::make_unique<FakeSource>(3, is_live, -1), {{.kind = kind}, true, 10}, 0);
+    for (int i = 0; i < 3; ++i) session.Advance(50);  // reads and sends frame 0, and reads frame 1
+    return session.NextLookUs(50);
+  };
+  EXPECT_EQ(next_look(false, PacerOptions::Kind::kLockstep), std::nullopt) << "a pose wakes it";
+  EXPECT_EQ(next_look(false, PacerOptions::Kind::kFree), std::nullopt);
+  EXPECT_EQ(next_look(false, PacerOptions::Kind::kTimed), 50 + kFrameUs);
+  EXPECT_EQ(next_look(true, PacerOptions::Kind::kLockstep), 50 + CameraSession::kLookAtLiveUs)
+      << "nothing says that a frame has come";
+}
+
 TEST(CameraSession, TruePosesGoBeforeTheirFrames) {
   CameraSession session = Recorded(3, 10);
   const CameraActions actions = AdvanceAll(session);

@@ -41,6 +41,18 @@ TEST(Pacer, TimedFollowsTheSourcesTimestamps) {
   EXPECT_FALSE(pacer.MayGo(5'000'000, 900'000));
 }
 
+TEST(Pacer, TimeAloneLetsTimedFramesGoWhenTheyAreDue) {
+  Pacer pacer({.kind = PacerOptions::Kind::kTimed, .speed = 3.0});
+  EXPECT_EQ(pacer.DueUs(0), std::nullopt) << "its clock has not begun";
+  ASSERT_TRUE(pacer.MayGo(1'000'000, 50));
+  for (int64_t utime_us = 1'000'000; utime_us < 1'000'050; ++utime_us) {
+    const int64_t due_us = pacer.DueUs(utime_us).value();
+    EXPECT_TRUE(pacer.MayGo(utime_us, due_us));
+    EXPECT_FALSE(pacer.MayGo(utime_us, due_us - 1));
+  }
+  EXPECT_EQ(Pacer({.kind = PacerOptions::Kind::kLockstep}).DueUs(0), std::nullopt);
+}
+
 TEST(Pacer, AFrameIsAsOldAsItsTimeIsPast) {
   Pacer pacer({.kind = PacerOptions::Kind::kTimed, .speed = 2.0});
   ASSERT_TRUE(pacer.MayGo(1'000'000, 50));

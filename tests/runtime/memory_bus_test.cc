@@ -12,6 +12,7 @@
 
 #include "core/errors.h"
 #include "core/version.h"
+#include "runtime/stream_settings.h"
 #include "support/example_values.h"
 
 namespace tessera {
@@ -334,6 +335,24 @@ TEST(MemoryBus, TimersAndIdleTasksRunByTheBusesClock) {
   EXPECT_GE(num_idle, 5 * 50);
 }
 
+TEST(MemoryBus, AnIdleTaskIsWokenWhenItAskedFor) {
+  MemoryBus bus(Defaults());
+  StageContext& stage = bus.AddContext("stage");
+  const int64_t begin_us = stage.now_us();
+  int num_woken = 0;
+  stage.WhenIdle([&] {
+    const int64_t due_us = begin_us + 12'345 * (num_woken + 1);
+    if (stage.now_us() < due_us) {
+      stage.WakeAt(due_us);
+      return false;
+    }
+    EXPECT_EQ(stage.now_us(), due_us);
+    ++num_woken;
+    return true;
+  });
+  EXPECT_TRUE(bus.RunUntil([&] { return num_woken == 20; }));
+}
+
 TEST(MemoryBus, StatusTellsOfTheStage) {
   MemoryBus bus(Defaults());
   StageContext& stage = bus.AddContext("stage");
@@ -377,10 +396,22 @@ TEST(MemoryBus, SameRunTwiceIsTheSame) {
   EXPECT_EQ(run(), run());
 }
 
+TEST(StreamSettings, ImagesAndTheMapMayHaveLargerMessages) {
+  Settings given = Defaults();
+  given.Override("bus.max_message_bytes=1400");
+  given.Override("bus.max_local_message_bytes=50000");
+  const StreamSettings settings = StreamSettings::From(given);
+  for (const BusKind bus : {BusKind::kMain, BusKind::kWork, BusKind::kTile}) {
+    EXPECT_EQ(settings.MaxMessageBytes(bus), 1400u);
+  }
+  for (const BusKind bus : {BusKind::kCamera, BusKind::kMap}) EXPECT_EQ(settings.MaxMessageBytes(bus), 50000u);
+  EXPECT_LT(settings.ReceiverOf(BusKind::kMap).max_asked, settings.ReceiverOf(BusKind::kWork).max_asked);
+}
+
 TEST(StreamSettings, AreChecked) {
-  for (const char* assignment :
-       {"bus.max_message_bytes=100", "bus.max_message_bytes=70000", "stream.history_bytes=0", "stream.heartbeat_ms=0",
-        "stream.repair_ms=0", "bus.first_tile_port=65300", "bus.channel_prefix=a b"}) {
+  for (const char* assignment : {"bus.max_message_bytes=100", "bus.max_message_bytes=70000",
+                                 "bus.max_local_message_bytes=70000", "stream.history_bytes=0", "stream.heartbeat_ms=0",
+                                 "stream.repair_ms=0", "bus.first_tile_port=65300", "bus.channel_prefix=a b"}) {
     Settings settings = Defaults();
     EXPECT_THROW(settings.Override(assignment), InputError) << assignment;
   }

@@ -17,7 +17,9 @@ namespace {
 // Yields some images and then ends, as a stream does whose server is gone.
 class FakeDevice : public FrameSource {
  public:
-  FakeDevice(int num_images, int width_px) : num_left_(num_images) {
+  // `num_yielded`: counts the images, if it is there.
+  FakeDevice(int num_images, int width_px, std::shared_ptr<std::atomic<int>> num_yielded = nullptr)
+      : num_left_(num_images), num_yielded_(std::move(num_yielded)) {
     calibration_.width_px = width_px;
     calibration_.height_px = 10;
   }
@@ -29,6 +31,7 @@ class FakeDevice : public FrameSource {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     CameraFrame frame;
     frame.utime_us = 20'000 * ++stamp_;
+    if (num_yielded_) ++*num_yielded_;
     return frame;
   }
   bool is_live() const override { return true; }
@@ -39,6 +42,7 @@ class FakeDevice : public FrameSource {
   std::vector<GroundTruthPose> truth_;
   std::vector<std::string> notes_;
   int num_left_;
+  std::shared_ptr<std::atomic<int>> num_yielded_;
   int64_t stamp_ = 0;
 };
 
@@ -72,8 +76,10 @@ TEST(LiveSource, ContinuesWhenTheCameraComesBack) {
 }
 
 TEST(LiveSource, KeepsTheNewestOfWhatNobodyTook) {
-  LiveSource source([] { return std::make_unique<FakeDevice>(10, 20); }, {.last_frame = 10});
-  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  auto num_yielded = std::make_shared<std::atomic<int>>(0);
+  LiveSource source([&] { return std::make_unique<FakeDevice>(10, 20, num_yielded); }, {.last_frame = 10});
+  while (*num_yielded < 10) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it waits
   EXPECT_TRUE(source.HasNext());
   const auto frame = source.Next();
   ASSERT_TRUE(frame);

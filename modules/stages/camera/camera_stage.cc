@@ -11,9 +11,6 @@
 namespace tessera {
 namespace {
 
-// How exactly timed frames leave; small against the time between two images of any camera.
-constexpr std::chrono::milliseconds kTick{2};
-
 std::unique_ptr<FrameSource> Open(const Settings& settings) {
   const auto camera = settings.Get<CameraSettings>();
   SourceOptions options;
@@ -62,7 +59,6 @@ CameraStage::CameraStage(StageContext& context)
     return session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us());
   });
   context.WhenIdle([this] { return Step(); });
-  context.Every(kTick, [] {});  // lets the idle task look at the clock
   context.Every(std::chrono::seconds(1), [this] {
     if (const auto report = session_.Watch(context_.now_us())) context_.ReportError(*report);
     TellEvents();
@@ -86,7 +82,11 @@ void CameraStage::TellEvents() {
 // Returns whether to continue at once.
 bool CameraStage::Step() {
   const CameraSession::State state = session_.Look(context_.now_us());
-  if (state == CameraSession::State::kWaits || state == CameraSession::State::kEnded) return false;
+  if (state == CameraSession::State::kWaits) {
+    if (const auto look_us = session_.NextLookUs(context_.now_us())) context_.WakeAt(*look_us);
+    return false;
+  }
+  if (state == CameraSession::State::kEnded) return false;
   std::optional<StepTimer> timer;
   if (state == CameraSession::State::kMustRead) timer.emplace(context_);  // the camera's own work is to decode images
   const CameraActions actions = session_.Advance(context_.now_us());

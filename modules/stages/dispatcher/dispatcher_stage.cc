@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "features/tile_packing.h"
 #include "messages/tracking_types.h"
@@ -54,8 +55,8 @@ void DispatcherStage::SubscribeAll() {
     session_.Receive(calibration);
     GiveWork();
   });
-  context_.Subscribe(kCamera, [this](const CameraFrame& frame, const MessageInfo& info) {
-    session_.Receive(frame, {info.epoch_us, info.publish_us, info.arrival_us}, context_.now_us());
+  context_.Subscribe(kCamera, [this](CameraFrame frame, const MessageInfo& info) {
+    session_.Receive(std::move(frame), {info.epoch_us, info.publish_us, info.arrival_us}, context_.now_us());
     GiveWork();
   });
   context_.Subscribe(kExtractorReady, [this](const ExtractorReady& ready) {
@@ -84,7 +85,11 @@ void DispatcherStage::GiveWork() {
     const WorkQueue::Assignment job = session_.GiveNext(context_.now_us());
     auto [tile, is_new] = tiles_.try_emplace(job.extractor);
     if (is_new) tile->second = context_.Advertise(TileTopic(job.extractor));
-    tile->second.Publish(packs_tiles_ ? PackTile(*job.job) : *job.job);
+    if (packs_tiles_) {
+      tile->second.Publish(PackTile(*job.job));
+    } else {
+      tile->second.Publish(*job.job);
+    }
   }
   const std::optional<EndOfStream> end = session_.End(context_.now_us());
   for (const std::string& report : session_.TakeReports()) context_.ReportError(report);

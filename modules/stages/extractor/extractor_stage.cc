@@ -1,5 +1,7 @@
 #include "stages/extractor/extractor_stage.h"
 
+#include <utility>
+
 namespace tessera {
 namespace {
 
@@ -39,13 +41,13 @@ void ExtractorStage::Serve(size_t robot) {
   robots_[robot].is_served = true;
   robots_[robot].features = context.Advertise(kTileFeatures);
   robots_[robot].ready = context.Advertise(kExtractorReady);
-  context.Subscribe(TileTopic(context.id()), [this, robot](const TileJob& job) { OnJob(robot, job); });
+  context.Subscribe(TileTopic(context.id()), [this, robot](TileJob job) { OnJob(robot, std::move(job)); });
   context.Subscribe(kEndOfStream, [this, robot](const EndOfStream& end) { OnEnd(robot, end); });
 }
 
-void ExtractorStage::OnJob(size_t robot, const TileJob& job) {
+void ExtractorStage::OnJob(size_t robot, TileJob job) {
   const Robot& owner = robots_[robot];
-  const auto taken = session_.Receive(robot, job, context_.now_us());
+  const auto taken = session_.Receive(robot, std::move(job), context_.now_us());
   if (!taken) owner.context->ReportError(taken.error().sentence);
   if (taken && *taken == ExtractorSession::Taken::kOfNewRun) owner.features.Forget();
   owner.context->SetQueue(static_cast<int64_t>(session_.num_waiting(robot)));

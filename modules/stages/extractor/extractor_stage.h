@@ -29,7 +29,7 @@ class ExtractorStage {
   void Serve(size_t robot);
   // Begins to serve those robots of which it is known that no other process has this one's name there.
   void ServeOthers();
-  void OnJob(size_t robot, const TileJob& job);
+  void OnJob(size_t robot, TileJob job);
   void OnEnd(size_t robot, const EndOfStream& end);
   // Does one job. Whether more wait.
   bool DoNextJob();

@@ -1,6 +1,7 @@
 #include "stages/mapper/mapper_stage.h"
 
 #include <memory>
+#include <utility>
 
 #include "core/errors.h"
 #include "wire/map_file.h"
@@ -55,8 +56,8 @@ MapperStage::MapperStage(StageContext& context)
 
 template <class Value>
 void MapperStage::Receive(const Topic<Value>& topic) {
-  context_.Subscribe(topic, [this](const Value& value) {
-    Do(session_.Receive(value));
+  context_.Subscribe(topic, [this](Value value) {
+    Do(session_.Receive(std::move(value)));
     Advance();
   });
 }

@@ -1,6 +1,7 @@
 #include "stages/reassembler/reassembler_stage.h"
 
 #include <string>
+#include <utility>
 
 #include "features/selection.h"
 #include "messages/tracking_types.h"
@@ -19,7 +20,7 @@ ReassemblerStage::ReassemblerStage(StageContext& context) : context_(context), a
   features_ = context.Advertise(kFeatures);
   acks_ = context.Advertise(kTileAck);
   end_of_stream_ = context.Advertise(kEndOfStream);
-  context.Subscribe(kTileFeatures, [this](const TileFeatures& tile) { OnTile(tile); });
+  context.Subscribe(kTileFeatures, [this](TileFeatures tile) { OnTile(std::move(tile)); });
   // One that was started again goes on behind what is tracked.
   context.Subscribe(kPose, [this](const PoseEstimate& pose) -> Result<> {
     const FrameId last = assembler_.last_released();
@@ -40,7 +41,7 @@ ReassemblerStage::ReassemblerStage(StageContext& context) : context_(context), a
   acks_.Publish({.frame = {0}, .tiles = {}, .wants_all = false, .lowest_priority = {}});  // nothing is here yet
 }
 
-void ReassemblerStage::OnTile(const TileFeatures& tile) {
+void ReassemblerStage::OnTile(TileFeatures tile) {
   if (tile.run != context_.epoch_us()) {
     // An extractor of a pool finished what an earlier run had asked of it.
     context_.SetValue("answers_of_other_runs", static_cast<double>(++num_of_other_runs_));
@@ -51,15 +52,17 @@ void ReassemblerStage::OnTile(const TileFeatures& tile) {
                          std::to_string(tile.tile) + " are refused: " + checked.error().sentence);
     return;
   }
-  const FrameAssembler::Result added = assembler_.Add(tile);
+  const FrameId frame = tile.frame;
+  const int32_t number = tile.tile;
+  const FrameAssembler::Result added = assembler_.Add(std::move(tile));
   if (added == FrameAssembler::Result::kRefused) {
-    context_.ReportError("tile " + std::to_string(tile.tile) + " of frame " + std::to_string(tile.frame.value) +
+    context_.ReportError("tile " + std::to_string(number) + " of frame " + std::to_string(frame.value) +
                          " contradicts the tiles that came before it, or too many frames are open: it is refused");
     return;
   }
   // Acknowledged also when repeated: the first acknowledgement may be what was late.
   const bool wants_all = added == FrameAssembler::Result::kTooFew;
-  acks_.Publish({.frame = tile.frame, .tiles = {tile.tile}, .wants_all = wants_all, .lowest_priority = {}});
+  acks_.Publish({.frame = frame, .tiles = {number}, .wants_all = wants_all, .lowest_priority = {}});
   Release();
 }
 

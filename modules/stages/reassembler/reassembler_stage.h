@@ -14,7 +14,7 @@ class ReassemblerStage {
   explicit ReassemblerStage(StageContext& context);
 
  private:
-  void OnTile(const TileFeatures& tile);
+  void OnTile(TileFeatures tile);
   void Release();
   void FinishIfDone();
 

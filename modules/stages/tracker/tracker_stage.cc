@@ -69,8 +69,8 @@ TrackerStage::TrackerStage(StageContext& context)
 
 template <class Value>
 void TrackerStage::Receive(const Topic<Value>& topic) {
-  context_.Subscribe(topic, [this](const Value& value) {
-    session_.Receive(value);
+  context_.Subscribe(topic, [this](Value value) {
+    session_.Receive(std::move(value));
     Advance();
   });
 }
