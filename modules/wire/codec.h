@@ -34,6 +34,8 @@ struct MessageHeader {
 // The header of a message of any type; nullopt if the message has no type of lcmtypes/, is malformed or its header is
 // out of range.
 std::optional<MessageHeader> ReadHeader(ByteView message);
+// The same of a message of ours that is not whole, or not looked at behind its header.
+std::optional<MessageHeader> ReadHeaderOfFront(ByteView message);
 
 // The name of the type of the messages that carry `Value`, such as "camera_image_t".
 template <class Value>
@@ -56,9 +58,9 @@ class ValueJoiner {
   ~ValueJoiner();
 
   // Takes the next message of the stream, for which ReadHeader gave `header`. The value, which stays valid until the
-  // next call; null if more parts are needed, or if this one belongs to a value whose beginning was missed. On failure
-  // the rest of the value is passed over.
-  Result<const Value*> Add(ByteView message, const MessageHeader& header);
+  // next call and may be moved from; null if more parts are needed, or if this one belongs to a value whose beginning
+  // was missed. On failure the rest of the value is passed over.
+  Result<Value*> Add(ByteView message, const MessageHeader& header);
   // Messages got lost before the next one. True if the value that was being joined is lost with them.
   bool Interrupt();
 

@@ -29,9 +29,11 @@ void PatchNumParts(const std::string& publisher, int32_t num_parts, Bytes* messa
 
 std::optional<MessageHeader> ReadHeader(ByteView message) {
   const WireType* type = WireType::Of(message);
-  if (type == nullptr || !type->Matches(message)) {
-    return std::nullopt;
-  }
+  return type != nullptr && type->Matches(message) ? ReadHeaderOfFront(message) : std::nullopt;
+}
+
+std::optional<MessageHeader> ReadHeaderOfFront(ByteView message) {
+  if (WireType::Of(message) == nullptr) return std::nullopt;
   header_t header;
   // Every type that is sent begins with its header; decoding one that doesn't gives nonsense, but stays in bounds.
   if (!WireType::Named("header_t").MatchesFront(message.subspan(8)) ||

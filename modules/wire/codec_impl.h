@@ -114,7 +114,7 @@ bool ValueJoiner<Value>::Interrupt() {
 }
 
 template <class Value>
-Result<const Value*> ValueJoiner<Value>::Add(ByteView message, const MessageHeader& header) {
+Result<Value*> ValueJoiner<Value>::Add(ByteView message, const MessageHeader& header) {
   using Message = MessageOf<Value>;
   State& state = *state_;
   const int32_t expected_part = std::exchange(state.next_part, 0);

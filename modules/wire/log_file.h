@@ -4,11 +4,15 @@
 // end.
 //
 // A log of ours has a file beside it, LOG.checksums: a line that says so, then the CRC-32 of each event, 4 bytes each.
+// Both grow event by event, so that a writer that is killed leaves whole events, behind which its successor continues.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +33,9 @@ class LogFileReader {
 
   // False at the end of the file. Throws InputError if an event is damaged or cut off, or has not its checksum.
   bool Next(LogEvent* event);
+  // The same with no more of the data than holds the header of a message; its checksum is not looked at.
+  bool NextFront(LogEvent* event);
+  int64_t num_checksums() const { return static_cast<int64_t>(checksums_.size()); }
   // Where the next event begins, bytes from the front; and going there.
   int64_t position() const;
   void Seek(int64_t position);
@@ -37,8 +44,12 @@ class LogFileReader {
   struct CloseFile {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
+  struct Lengths {
+    uint64_t channel = 0, data = 0;
+  };
   [[noreturn]] void ThrowCut() const;
   void ReadChecksums();
+  std::optional<Lengths> ReadHead(LogEvent* event);
   void Check(int64_t number, uint32_t checksum, const std::string& channel) const;
 
   std::string path_;
@@ -46,6 +57,7 @@ class LogFileReader {
   int64_t size_ = 0;
   bool has_checksums_ = false;
   std::vector<uint32_t> checksums_;  // by number of the event
+  std::array<uint8_t, 28> head_{};   // of the event that was read last
   int64_t last_number_ = -1;         // of the event that was read last
 };
 
@@ -56,6 +68,11 @@ class LogFileWriter {
   // Writes into PATH.part, which takes the name PATH when it is closed: no log is ever half written. Throws InputError
   // if it can't be written.
   explicit LogFileWriter(const std::string& path, Checksums checksums = Checksums::kNone);
+  // Continues PATH.part, which a writer with checksums left when it was killed, behind its last whole event. `on_event`
+  // gets the front (NextFront) of each that is there.
+  LogFileWriter(const std::string& path, const std::function<void(const LogEvent&)>& on_event);
+  // Whether there is something to continue. False if it was given up.
+  static bool CanContinue(const std::string& path);
   ~LogFileWriter();  // without Close(): nothing is kept
   LogFileWriter(const LogFileWriter&) = delete;
   LogFileWriter& operator=(const LogFileWriter&) = delete;
@@ -72,13 +89,15 @@ class LogFileWriter {
 
  private:
   [[noreturn]] void ThrowUnwritable(const std::string& path) const;
+  void Open(const char* mode, Checksums checksums);
+  bool CloseFiles();
+  void Remove() const;
+  void WriteTo(std::FILE* file, const void* bytes, size_t size) const;
+  void CutChecksums(int64_t number);
 
-  std::string path_;
-  std::FILE* file_;
-  void WriteChecksums() const;
-
-  Checksums mode_;
-  std::vector<uint32_t> checksums_;
+  const std::string path_, part_;  // the name at the end, and until then
+  std::FILE* file_ = nullptr;
+  std::FILE* checksums_ = nullptr;  // null: there are none
   int64_t num_events_ = 0;
   int64_t num_bytes_ = 0;
 };

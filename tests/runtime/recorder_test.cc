@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <random>
 #include <string>
@@ -19,6 +20,8 @@
 namespace tessera {
 namespace {
 
+namespace fs = std::filesystem;
+
 class RecorderTest : public testing::Test {
  protected:
   void SetUp() override { std::filesystem::create_directories(folder_); }
@@ -28,7 +31,17 @@ class RecorderTest : public testing::Test {
     Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
     settings.Override("recorder.path=" + path_);
     settings.Override("bus.channel_prefix=" + prefix);
+    settings.Override("stream.journal_dir=" + folder_ + "/journal");
     return settings;
+  }
+  // Ends the recorder as SIGKILL would, which leaves its files as they are.
+  void Kill(MemoryBus& bus) const {
+    const std::string kept = folder_ + "/kept";
+    for (const std::string& file : parts_) fs::copy_file(file, kept + fs::path(file).extension().string());
+    bus.Kill("recorder");
+    fs::remove(path_);
+    fs::remove(path_ + ".checksums");
+    for (const std::string& file : parts_) fs::rename(kept + fs::path(file).extension().string(), file);
   }
   // The numbers of the messages in the log, by channel, and the times in order.
   std::map<std::string, std::vector<int64_t>> ReadNumbers() const {
@@ -50,6 +63,7 @@ class RecorderTest : public testing::Test {
 
   const std::string folder_ = testing::TempDir() + "recorder_test";
   const std::string path_ = folder_ + "/run.lcmlog";
+  const std::vector<std::string> parts_{path_ + ".part", path_ + ".part.checksums"};  // until it has its name
 };
 
 TEST_F(RecorderTest, HasEveryMessageOnceInOrder) {
@@ -86,6 +100,52 @@ TEST_F(RecorderTest, HasWhatWasSentBeforeItCame) {
   bus.RunUntilQuiet();
   bus.Kill("recorder");
   EXPECT_EQ(ReadNumbers()["POSE"], Counted(10));
+}
+
+TEST_F(RecorderTest, OneThatIsKilledContinuesItsLogAndLosesNothing) {
+  MemoryBus bus(MakeSettings("robot/"));
+  std::mt19937 generator(4);
+  bus.Start<RecorderStage>("recorder");
+  const auto frames = bus.AddContext("camera").Advertise(kCamera);
+  const auto poses = bus.AddContext("tracker").Advertise(kPose);
+  const auto publish = [&](int64_t number) {
+    for (int64_t i = 0; i < number; ++i) {
+      frames.Publish(DrawValue<CameraFrame>(generator, 1));
+      poses.Publish({.frame = {i}});
+    }
+  };
+  publish(20);
+  bus.RunUntilQuiet(2.0);
+  for (const std::string torn : {"an event of which the half was wr", "\1\2"}) {
+    Kill(bus);
+    std::ofstream(torn.size() > 4 ? parts_[0] : parts_[1], std::ios::app) << torn;
+    publish(7);
+    bus.RunUntilQuiet();
+    bus.Start<RecorderStage>("recorder");
+    publish(5);
+    bus.RunUntilQuiet(2.0);
+  }
+  bus.Kill("recorder");
+  const auto numbers = ReadNumbers();  // checks the checksums
+  EXPECT_GE(numbers.at("robot/CAMERA").size(), 44U);
+  EXPECT_EQ(numbers.at("robot/CAMERA"), Counted(numbers.at("robot/CAMERA").size()));
+  EXPECT_EQ(numbers.at("robot/POSE"), Counted(44));
+  EXPECT_FALSE(fs::exists(parts_[0]) || fs::exists(parts_[1]));
+}
+
+TEST_F(RecorderTest, OneThatIsKilledAfterItHadGivenUpLeavesNoLogThatLooksWhole) {
+  MemoryBus bus(MakeSettings(""));
+  bus.Start<RecorderStage>("recorder");
+  const auto poses = bus.AddContext("tracker").Advertise(kPose);
+  bus.RunUntilQuiet();
+  Kill(bus);
+  for (const std::string& file : parts_) fs::remove(file);
+  bus.Start<RecorderStage>("recorder");
+  poses.Publish({.frame = {1}});
+  bus.RunUntilQuiet();
+  EXPECT_EQ(bus.exit_status("recorder"), 0) << "the run goes on";
+  bus.Kill("recorder");
+  EXPECT_FALSE(fs::exists(path_));
 }
 
 // Files of this process can't grow beyond a size, as on a full disk.

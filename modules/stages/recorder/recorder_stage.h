@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "runtime/stage.h"
@@ -18,14 +19,15 @@ class RecorderStage {
   RecorderStage& operator=(const RecorderStage&) = delete;
 
  private:
+  // Behind what an earlier life has recorded.
+  void Continue(const std::string& path);
   void Write(const std::string& channel, ByteView message, int64_t arrival_us);
   // The run continues without a recording.
   void GiveUp(const std::string& problem);
 
   StageContext& context_;
-  LogFileWriter log_;
-  bool is_whole_ = true;
-  int64_t time_us_ = 0;  // of the last event: time never runs back in a log
+  std::unique_ptr<LogFileWriter> log_;  // null: given up
+  int64_t time_us_ = 0;                 // of the last event: time never runs back in a log
 };
 
 }  // namespace tessera

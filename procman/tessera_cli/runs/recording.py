@@ -57,6 +57,7 @@ def record(arguments: Namespace, source: Source, log: Path, keep_interrupted: bo
         written.unlink(missing_ok=True)
         checksums_of(written).unlink(missing_ok=True)
         _part(written).unlink(missing_ok=True)
+        checksums_of(_part(written)).unlink(missing_ok=True)
     return num_frames
 
 
