@@ -32,6 +32,7 @@ OccupancyMap::OccupancyMap(const OccupancyOptions& options)
       max_(LogOddsOf(options.prob_max)),
       caster_(options) {
   ThrowIfFailed<std::logic_error>(options.Check());
+  options_.min_hits = std::max(1, options_.min_hits);
 }
 
 void OccupancyMap::Put(KeyframeId keyframe, SharedScan scan, const Rigid3& world_from_camera) {
@@ -86,11 +87,16 @@ void OccupancyMap::Count(const Placed& placed, int sign) {
   }
 }
 
+VoxelState OccupancyMap::StateOf(const Counts& counts) const {
+  if (LogOdds(counts) < 0) return VoxelState::kFree;
+  return counts.num_hits >= options_.min_hits ? VoxelState::kOccupied : VoxelState::kUnknown;
+}
+
 OccupancyBlock OccupancyMap::StatesOf(BlockKey key, const VoxelBlocks<Counts>::Block& counts) const {
   OccupancyBlock block = EmptyBlock(key);
   for (size_t i = 0; i < counts.size(); ++i) {
-    if (!counts[i].is_known()) continue;
-    block.Set(i, LogOdds(counts[i]) >= 0 ? VoxelState::kOccupied : VoxelState::kFree);
+    const VoxelState state = StateOf(counts[i]);
+    if (state != VoxelState::kUnknown) block.Set(i, state);
   }
   return block;
 }
@@ -127,7 +133,7 @@ std::string OccupancyMap::ColorTreeFile() const {
   for (const auto& [key, block] : counts_.blocks()) {
     for (size_t i = 0; i < block->size(); ++i) {
       const Counts& counts = (*block)[i];
-      if (!counts.is_known()) continue;
+      if (StateOf(counts) == VoxelState::kUnknown) continue;
       const auto log_odds =
           static_cast<float>(std::clamp(LogOdds(counts), min_, max_)) * static_cast<float>(kLogOddsUnit);
       octomap::ColorOcTreeNode* node = tree.setNodeValue(VoxelAt(key, i), log_odds, /*lazy_eval=*/true);

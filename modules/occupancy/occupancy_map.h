@@ -4,7 +4,7 @@
 // they have no point in it). What it is follows from the counts alone,
 //
 //   L = h * log(prob_hit / (1 - prob_hit)) + m * log(prob_miss / (1 - prob_miss))      log-odds, in steps of 1/1000
-//   occupied if L >= 0 and h + m > 0; free if L < 0; unknown if h + m = 0
+//   occupied if L >= 0 and h >= min_hits; free if L < 0; else unknown
 //
 // which is the update of A. Hornung et al., "OctoMap: An Efficient Probabilistic 3D Mapping Framework Based on
 // Octrees", Autonomous Robots 2013, with its bounds applied to the sum instead of to each term. Counts are integers,
@@ -69,14 +69,13 @@ class OccupancyMap {
     uint16_t num_hits = 0;
     uint16_t num_misses = 0;
     uint32_t intensity_sum = 0;  // over the scans that hit it
-
-    bool is_known() const { return num_hits > 0 || num_misses > 0; }
   };
+  VoxelState StateOf(const Counts& counts) const;
   void Count(const Placed& placed, int sign);
   int64_t LogOdds(const Counts& counts) const { return counts.num_hits * hit_ + counts.num_misses * miss_; }
   OccupancyBlock StatesOf(BlockKey key, const VoxelBlocks<Counts>::Block& counts) const;
 
-  OccupancyOptions options_;
+  OccupancyOptions options_;        // min_hits is at least 1
   int64_t hit_, miss_, min_, max_;  // log-odds, 1/1000
   RayCaster caster_;
   VoxelBlocks<Counts> counts_;

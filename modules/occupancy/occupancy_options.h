@@ -13,17 +13,18 @@ struct OccupancyOptions {
   double prob_miss = 0.4;   // likewise, by one scan whose rays go through it
   double prob_min = 0.12;   // what the octree says of a voxel stays between these
   double prob_max = 0.97;
+  int min_hits = 0;  // scans that must have a point in a voxel, so that it is told to be occupied; 0: see FitToSensor
 
   Result<> Check() const;
 };
 
-// `options` with what is left at 0 filled in by the sensor: how fine and how far it measures.
+// `options` with what is left at 0 filled in by the sensor: how far and how finely it measures.
 //
-//   RGB-D    resolution 0.025 m, max_range 4 m: structured light
-//   stereo   resolution 0.4 baselines, max_range 40 baselines: half a pixel of disparity is one voxel at 24 baselines
-//   where
-//            the focal length is 700 px
-//   mono     resolution 0.05, max_range 5 units of the map, whose first keyframes see points at a median distance of 1
+//   RGB-D    max_range 4 m, resolution 0.025 m: structured light
+//   stereo   max_range f b / 6 px, where half a pixel of disparity is a twelfth of the distance; resolution 1/160 of
+//   it,
+//            which is half a pixel at 13 px of disparity. Two scans must agree, since a single match may be wrong
+//   mono     max_range 5, resolution 0.05 units of the map, whose first keyframes see points at a median distance of 1
 OccupancyOptions FitToSensor(OccupancyOptions options, const CameraCalibration& camera);
 
 }  // namespace tessera

@@ -51,7 +51,11 @@ SeenVoxels RayCaster::Cast(const Scan& scan, const Rigid3& world_from_camera) {
     } else {
       seen.misses.push_back(end.voxel);
     }
-    tree_.computeRayKeys(origin, tree_.keyToCoord(end.voxel), ray_);
+    const octomap::point3d to_end = tree_.keyToCoord(end.voxel) - origin;
+    const double distance = to_end.norm();
+    const double free_distance = distance - UncertaintyAt(distance, scan.camera);
+    if (free_distance <= 0.0) continue;
+    tree_.computeRayKeys(origin, origin + to_end * static_cast<float>(free_distance / distance), ray_);
     for (const octomap::OcTreeKey& voxel : ray_) {
       Mark& mark = marks.At(voxel);
       if (mark != kUntouched) continue;

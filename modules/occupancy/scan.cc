@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kMaxCount = std::numeric_limits<uint16_t>::max();
 constexpr uint8_t kUnknownIntensity = 255;  // OctoMap's color of a voxel without one
+constexpr double kDisparitySigmaPx = 0.25;
 
 // The number of pixels from one ray to the next.
 int StrideFor(const CameraCalibration& camera, const OccupancyOptions& options) {
@@ -33,7 +34,8 @@ cv::Mat View(const GrayImage& image) {
   return {image.height, image.width, CV_8UC1, const_cast<uint8_t*>(image.pixels.data())};
 }
 
-// Disparities in 1/16 px; not positive: none.
+// Disparities in 1/16 px; not positive: none. OpenCV leaves out the columns at the left in which the widest disparity
+// would begin outside of the right image: both images get a margin there, into which no match may lead.
 cv::Mat MatchDisparities(const CameraFrame& frame, int max_disparity_px) {
   constexpr int kWindow = 5;                // px
   constexpr int kArea = kWindow * kWindow;  // the penalties are per pixel of the window
@@ -44,9 +46,14 @@ cv::Mat MatchDisparities(const CameraFrame& frame, int max_disparity_px) {
                                               /*speckleWindowSize=*/100, /*speckleRange=*/2,
                                               cv::StereoSGBM::MODE_SGBM_3WAY);  // the fastest
   cv::setNumThreads(1);                                                         // parallelism is between processes
+  const auto with_margin = [&](const GrayImage& image) {
+    cv::Mat wide;
+    cv::copyMakeBorder(View(image), wide, 0, 0, num_disparities, 0, cv::BORDER_REPLICATE);
+    return wide;
+  };
   cv::Mat disparities;
-  matcher->compute(View(frame.left), View(frame.right), disparities);
-  return disparities;
+  matcher->compute(with_margin(frame.left), with_margin(frame.right), disparities);
+  return disparities.colRange(num_disparities, disparities.cols);
 }
 
 DepthImage DepthOfStereo(const CameraFrame& frame, const CameraCalibration& camera, double unit_m,
@@ -57,7 +64,7 @@ DepthImage DepthOfStereo(const CameraFrame& frame, const CameraCalibration& came
     const auto* disparity = disparities.ptr<int16_t>(y);
     uint16_t* counts = depth.row(y);
     for (int x = 0; x < depth.width; ++x) {
-      if (disparity[x] <= 0) continue;
+      if (disparity[x] <= 0 || disparity[x] > 16 * x) continue;
       const double depth_m = 16.0 * camera.fx_px * camera.baseline_m / disparity[x];
       counts[x] = static_cast<uint16_t>(std::min(kMaxCount, std::round(depth_m / unit_m)));
     }
@@ -91,6 +98,11 @@ Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe) {
     }
   }
   return scan;
+}
+
+double UncertaintyAt(double distance, const CameraCalibration& camera) {
+  if (camera.sensor != SensorType::kStereo) return 0.0;
+  return 2.0 * kDisparitySigmaPx * distance * distance / (camera.fx_px * camera.baseline_m);
 }
 
 std::vector<ScanPoint> PointsOf(const Scan& scan) {

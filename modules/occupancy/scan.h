@@ -38,6 +38,14 @@ Scan ScanFromImages(const CameraFrame& frame, const CameraCalibration& camera, c
 // From the landmarks that a keyframe observes, in the order of its keypoints.
 Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe);
 
+// How far before and behind its point a surface may be that a scan of this camera sees at this distance, m: twice the
+// standard deviation of the depth of stereo,
+//
+//   sigma_z = z^2 / (f b) * sigma_d,   sigma_d = 0.25 px
+//
+// in which the distance stands for z. 0 for other sensors, whose errors are below a voxel.
+double UncertaintyAt(double distance, const CameraCalibration& camera);
+
 // The points of a scan, in a fixed order.
 std::vector<ScanPoint> PointsOf(const Scan& scan);
 

@@ -1,12 +1,14 @@
 // How well the occupancy map of a run shows what depth images show.
 //
-//   occupancy_accuracy RUN SOURCE [every=N] [range=METERS] [align=positions|poses] [poses=truth|run]
+//   occupancy_accuracy RUN SOURCE [every=N] [range=METERS] [align=poses|positions] [poses=truth|run]
 //   occupancy_accuracy /tmp/kitchen tum:../shared/data/rgbd/kitchen every=3
 //   occupancy_accuracy /tmp/street sim:street-short range=20    # the run was stereo; the depth is the simulator's
 //
 // RUN holds trajectory.txt and occupancy.bt; SOURCE has depth images and true poses, of which every N-th frame counts.
-// The true poses are brought into the run's world by the rigid alignment of the trajectories: of their positions, or of
-// the whole poses, where the camera stayed so close to one place that positions leave the rotation open. poses=run
+// The true poses are brought into the run's world by one rigid motion, which aligns the trajectories. It is made of the
+// whole poses: a depth image is seen from a position and in a direction, and where the path is short, positions alone
+// leave open how the two worlds are turned against each other, which has nothing to do with the map. On long paths,
+// align=positions gives the same. poses=run
 // places the images by the run's own poses: what is measured then is the map alone. Points of the depth images up to
 // `range` are sorted into the voxels of the map. Told is which share of the occupied voxels lies within two voxels of a
 // depth point (precision), and of the voxels that hold points of at least 5 depth images, which share is occupied or
@@ -38,8 +40,7 @@ constexpr double kSeenAt = 2.0;  // m from the camera
 struct Arguments {
   std::string run;
   SourceOptions source;
-  std::map<std::string, std::string> texts = {
-      {"every", "5"}, {"range", "4"}, {"align", "positions"}, {"poses", "truth"}};
+  std::map<std::string, std::string> texts = {{"every", "5"}, {"range", "4"}, {"align", "poses"}, {"poses", "truth"}};
 };
 
 Arguments ParseArguments(int argc, char** argv) {

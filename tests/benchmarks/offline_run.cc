@@ -236,6 +236,68 @@ std::optional<Consistency> MeasureConsistency(const OfflineRun& run, const std::
   return sum;
 }
 
+namespace {
+
+constexpr double kMinWay_m = 0.1;  // of a window: a camera that stands still shows no scale
+
+struct ScaleAt {
+  double time_s;
+  double log_scale;
+};
+
+// Of each window that begins with a tracked frame.
+std::vector<ScaleAt> ScalesOf(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth) {
+  struct Place {
+    double time_s, way, true_way;  // since the first one
+  };
+  std::vector<Place> places;
+  const Rigid3 *last = nullptr, *true_last = nullptr;
+  for (const GroundTruthPose& pose : truth) {
+    const auto found = estimate.find(pose.frame);
+    if (found == estimate.end()) continue;
+    Place place{1e-6 * static_cast<double>(pose.utime_us - truth.front().utime_us), 0.0, 0.0};
+    if (last != nullptr) {
+      place.way = places.back().way + (found->second.translation - last->translation).norm();
+      place.true_way = places.back().true_way + (pose.world_from_camera.translation - true_last->translation).norm();
+    }
+    places.push_back(place);
+    last = &found->second;
+    true_last = &pose.world_from_camera;
+  }
+  std::vector<ScaleAt> scales;
+  for (auto begin = places.begin(), end = begin; begin != places.end(); ++begin) {
+    end = std::find_if(end, places.end(), [&](const Place& p) { return p.time_s >= begin->time_s + kScaleWindow_s; });
+    if (end == places.end()) break;
+    const double true_way = end->true_way - begin->true_way;
+    if (true_way < kMinWay_m) continue;
+    scales.push_back({0.5 * (begin->time_s + end->time_s), std::log((end->way - begin->way) / true_way)});
+  }
+  return scales;
+}
+
+}  // namespace
+
+std::optional<ScaleChange> MeasureScale(const std::map<FrameId, Rigid3>& estimate,
+                                        const std::vector<GroundTruthPose>& truth) {
+  const std::vector<ScaleAt> scales = ScalesOf(estimate, truth);
+  if (scales.empty()) return std::nullopt;
+  ScaleChange change;
+  double squares = 0.0;
+  int num = 0;
+  for (auto from = scales.begin(), after = from; from != scales.end(); ++from) {
+    for (auto to = from; to != scales.end() && to->time_s <= from->time_s + 10.0; ++to) {
+      const double ratio = std::exp(std::abs(to->log_scale - from->log_scale));
+      if (ratio > change.greatest) change = {ratio, to->time_s, 1.0};
+    }
+    after = std::find_if(after, scales.end(), [&](const ScaleAt& at) { return at.time_s >= from->time_s + 5.0; });
+    if (after == scales.end()) continue;
+    squares += (after->log_scale - from->log_scale) * (after->log_scale - from->log_scale);
+    ++num;
+  }
+  change.typical = std::exp(std::sqrt(squares / std::max(1, num)));
+  return change;
+}
+
 std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,
                                bool with_scale) {
   std::vector<Eigen::Vector3d> a, b;

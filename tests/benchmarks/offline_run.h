@@ -63,6 +63,19 @@ struct Consistency {
 std::optional<Consistency> MeasureConsistency(const OfflineRun& run, const std::vector<GroundTruthPose>& truth,
                                               bool with_scale);
 
+// How steady the scale of the way is: s(t) = way that was estimated / true way, over kScaleWindow_s around t. Changes
+// are ratios; RMS errors of single runs hide them, since an error at one place makes up for one at another.
+struct ScaleChange {
+  double greatest = 1.0;    // ratio, >= 1, of s at two times at most 10 s apart
+  double greatest_s = 0.0;  // the later of the two, from the first frame on
+  double typical = 1.0;     // exp of the RMS of log(s(t + 5 s) / s(t))
+};
+inline constexpr double kScaleWindow_s = 2.0;
+
+// nullopt where the camera is tracked for less than a window, or does not move.
+std::optional<ScaleChange> MeasureScale(const std::map<FrameId, Rigid3>& estimate,
+                                        const std::vector<GroundTruthPose>& truth);
+
 // RMS distance [m] of the positions from the true ones after the best alignment; nullopt if too few are known.
 std::optional<double> RmsError(const std::map<FrameId, Rigid3>& estimate, const std::vector<GroundTruthPose>& truth,
                                bool with_scale);

@@ -1,11 +1,12 @@
 // The whole of mapping without the bus: reads a data set, extracts, tracks and maps in one thread, with the deltas
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
-//   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] [vocabulary=FILE]
-//   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
+//   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0]
+//   [vocabulary=FILE] offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
-// OUT_DIR gets figures.csv, frames.csv, trajectory.txt (after all optimization), trajectory_live.txt and
-// ground_truth.txt, TUM rows each.
+// With several delays, the sequence is played once with each; the spread tells what chance alone does to the errors.
+// OUT_DIR, or its delay_N for each of several delays, gets figures.csv, frames.csv, trajectory.txt (after all
+// optimization), trajectory_live.txt and ground_truth.txt, TUM rows each.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,7 +14,9 @@
 #include <fstream>
 #include <iostream>
 #include <numeric>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "benchmarks/offline_run.h"
 #include "core/errors.h"
@@ -24,10 +27,17 @@ namespace {
 struct Arguments {
   SourceOptions source;
   FeatureOptions features;
-  int64_t map_delay_frames = 3;
+  std::vector<int64_t> map_delays{3};  // frames
   bool is_mirrored = false;
   std::string vocabulary;
 };
+
+std::vector<int64_t> ParseNumbers(const std::string& text) {
+  std::vector<int64_t> numbers;
+  std::istringstream stream(text);
+  for (std::string number; std::getline(stream, number, ',');) numbers.push_back(std::stoll(number));
+  return numbers;
+}
 
 Arguments ParseArguments(int argc, char** argv) {
   Arguments arguments;
@@ -40,13 +50,15 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.vocabulary = text.substr(key.size() + 1);
       continue;
     }
+    if (key == "delay") {
+      arguments.map_delays = ParseNumbers(text.substr(key.size() + 1));
+      continue;
+    }
     const int64_t value = std::stoll(text.substr(key.size() + 1));
     if (key == "first")
       arguments.source.first_frame = value;
     else if (key == "last")
       arguments.source.last_frame = value;
-    else if (key == "delay")
-      arguments.map_delay_frames = value;
     else if (key == "features")
       arguments.features.num_features = static_cast<int>(value);
     else if (key == "mirror")
@@ -129,6 +141,10 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
               map.Sha256Hex().c_str());
   std::printf("RMS error %.4f m, live %.4f m\n", RmsError(optimized, sequence.ground_truth, is_mono).value_or(-1.0),
               RmsError(run.Live(), sequence.ground_truth, is_mono).value_or(-1.0));
+  if (const auto scale = is_mono ? MeasureScale(optimized, sequence.ground_truth) : std::nullopt) {
+    std::printf("scale: greatest change within 10 s %.3f, until %.1f s; typical change over 5 s %.3f\n",
+                scale->greatest, scale->greatest_s, scale->typical);
+  }
   if (const auto consistency = MeasureConsistency(run, sequence.ground_truth, is_mono)) {
     const double dof = is_mono ? 5.0 : 6.0;
     std::printf("NEES / %.0f %.2f (95 %% band 1 +- %.2f), %.0f %% within 95 %%; velocity error %.3f m/s RMS\n", dof,
@@ -153,28 +169,38 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
               static_cast<long>(run.mapper.num_void_loops()), map.closed_loops().size());
 }
 
+void Run(const Arguments& arguments, const FeatureSequence& sequence, int64_t map_delay_frames,
+         const std::filesystem::path& out_dir) {
+  OfflineRun run(MapperOptions{});
+  if (!arguments.vocabulary.empty()) {
+    run.loop_closer = std::make_unique<LoopCloser>(Vocabulary::Load(arguments.vocabulary), LoopCloserOptions{});
+  }
+  Play(sequence.frames, MapTrackerOptions{}, map_delay_frames, run);
+  Report(sequence, run);
+  WriteFiles(sequence, run, out_dir);
+  WriteFigures(sequence, run, out_dir);
+}
+
 }  // namespace
 }  // namespace tessera
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::cerr << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3] [features=2000] [mirror=0] "
-                 "[vocabulary=FILE]\n";
+    std::cerr
+        << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] "
+           "[vocabulary=FILE]\n";
     return 2;
   }
   try {
     const tessera::Arguments arguments = tessera::ParseArguments(argc, argv);
     const tessera::FeatureSequence sequence =
         tessera::ExtractSequence(arguments.source, arguments.features, arguments.is_mirrored);
-    tessera::OfflineRun run(tessera::MapperOptions{});
-    if (!arguments.vocabulary.empty()) {
-      run.loop_closer = std::make_unique<tessera::LoopCloser>(tessera::Vocabulary::Load(arguments.vocabulary),
-                                                              tessera::LoopCloserOptions{});
+    const std::filesystem::path out_dir = argv[3];
+    for (const int64_t delay : arguments.map_delays) {
+      const bool is_single = arguments.map_delays.size() == 1;
+      if (!is_single) std::printf("delay %ld\n", static_cast<long>(delay));
+      tessera::Run(arguments, sequence, delay, is_single ? out_dir : out_dir / ("delay_" + std::to_string(delay)));
     }
-    tessera::Play(sequence.frames, tessera::MapTrackerOptions{}, arguments.map_delay_frames, run);
-    tessera::Report(sequence, run);
-    tessera::WriteFiles(sequence, run, argv[3]);
-    tessera::WriteFigures(sequence, run, argv[3]);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 2;

@@ -107,6 +107,18 @@ TEST(OccupancyMap, AScanCountsOnceForAVoxel) {
   EXPECT_EQ(map.ColorTreeFile(), once);
 }
 
+TEST(OccupancyMap, WhatTooFewScansHitIsNotKnown) {
+  OccupancyOptions options = RoomOptions();
+  options.min_hits = 2;
+  OccupancyMap map(options);
+  const View view = ViewsOfRoom(1)[0];
+  map.Put({0}, view.scan, view.world_from_camera);
+  EXPECT_EQ(StatesOf(map).Num(VoxelState::kOccupied), 0);
+  EXPECT_GT(StatesOf(map).Num(VoxelState::kFree), 0);
+  map.Put({1}, view.scan, view.world_from_camera);
+  EXPECT_EQ(StatesOf(map).Num(VoxelState::kOccupied), StatesOf(MapOf({view})).Num(VoxelState::kOccupied));
+}
+
 TEST(OccupancyMap, OnlyWhatChangedIsTold) {
   std::vector<View> views = ViewsOfRoom(5);
   OccupancyMap map = MapOf(views);

@@ -40,6 +40,16 @@ TEST(RayCaster, ARayEndsAtTheMaximumRangeAndHitsNothingThere) {
   EXPECT_EQ(seen.misses.size(), 21U);
 }
 
+TEST(RayCaster, WhereStereoMayBeWrongARayMissesNothing) {
+  const Rigid3 pose{Eigen::Quaterniond::Identity(), {0.05, 0.05, 0.05}};
+  Scan scan = ScanOf({{0, 0, 1.0}});
+  scan.camera = {.sensor = SensorType::kStereo, .fx_px = 22.0, .baseline_m = 0.1};
+  EXPECT_NEAR(UncertaintyAt(1.0, scan.camera), 0.227, 1e-3);
+  const SeenVoxels seen = RayCaster(kOptions).Cast(scan, pose);
+  ASSERT_EQ(seen.hits.size(), 1U);
+  EXPECT_EQ(seen.misses.size(), 8U) << "up to 0.77 m";
+}
+
 TEST(RayCaster, AVoxelIsSeenOnceAndNoHitIsAlsoAMiss) {
   const Rigid3 pose = CameraAt({0.1, 0.0, 0.0}, 0.3);
   const SeenVoxels seen = RayCaster(RoomOptions()).Cast(*ScanOfRoom(pose), pose);

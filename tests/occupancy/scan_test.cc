@@ -53,8 +53,9 @@ TEST(Scan, AStereoPairIsMatched) {
     }
   }
   const OccupancyOptions options = FitToSensor({}, camera);
-  EXPECT_DOUBLE_EQ(options.resolution, 0.08);
-  EXPECT_DOUBLE_EQ(options.max_range, 8.0);
+  EXPECT_DOUBLE_EQ(options.max_range, 100.0 * 0.2 / 6.0);
+  EXPECT_DOUBLE_EQ(options.resolution, options.max_range / 160.0);
+  EXPECT_EQ(options.min_hits, 2);
   const std::vector<ScanPoint> points = PointsOf(ScanFromImages(frame, camera, options, 32));
   ASSERT_GT(points.size(), 5000U);
   const double depth_m = camera.fx_px * camera.baseline_m / kDisparityPx;
@@ -62,6 +63,20 @@ TEST(Scan, AStereoPairIsMatched) {
     return std::abs(point.in_camera.z() - depth_m) < 0.02 * depth_m;
   });
   EXPECT_GT(static_cast<double>(num_right), 0.9 * static_cast<double>(points.size()));
+  // Also of columns in which the widest disparity would begin outside of the right image.
+  const auto num_at_the_left = std::count_if(points.begin(), points.end(), [&](const ScanPoint& point) {
+    const double x_px = camera.fx_px * point.in_camera.x() / point.in_camera.z() + camera.cx_px;
+    return x_px > kDisparityPx && x_px < 32.0;
+  });
+  EXPECT_GT(num_at_the_left, 1000);
+}
+
+TEST(Scan, StereoIsUncertainByTheSquareOfTheDistanceAndOtherSensorsAreNot) {
+  CameraCalibration camera{.sensor = SensorType::kStereo, .fx_px = 400.0, .baseline_m = 0.1};
+  EXPECT_DOUBLE_EQ(UncertaintyAt(2.0, camera), 0.5 * 2.0 * 2.0 / 40.0);
+  EXPECT_DOUBLE_EQ(UncertaintyAt(4.0, camera), 4.0 * UncertaintyAt(2.0, camera));
+  camera.sensor = SensorType::kRgbd;
+  EXPECT_EQ(UncertaintyAt(2.0, camera), 0.0);
 }
 
 TEST(Scan, TheLandmarksThatAKeyframeObservesAreItsPoints) {

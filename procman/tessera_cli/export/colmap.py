@@ -18,6 +18,10 @@ from tessera_cli.maps.map_replica import CameraModel, Keyframe, MapReplica
 from tessera_cli.maps.poses import conjugate, rotate, rotation_matrices
 from tessera_cli.runs.recorded_images import left_images
 
+# What a model's folder holds.
+CAMERAS_FILE, IMAGES_FILE, POINTS_FILE, IMAGES = "cameras.txt", "images.txt", "points3D.txt", "images"
+CONTENT = (CAMERAS_FILE, IMAGES_FILE, POINTS_FILE, IMAGES)
+
 HALF_PIXEL = 0.5
 GRAY = 128
 
@@ -73,10 +77,10 @@ def image_name(keyframe: Keyframe) -> str:
 
 def write_model(model: Model, folder: Path, grays: np.ndarray | None) -> None:
     """Text files in `folder`. `grays`: n, 0..255, of the landmarks."""
-    write_text(folder / "cameras.txt", "".join(_camera_rows(model)))
-    write_text(folder / "images.txt", "".join(_image_rows(model)))
+    write_text(folder / CAMERAS_FILE, "".join(_camera_rows(model)))
+    write_text(folder / IMAGES_FILE, "".join(_image_rows(model)))
     values = np.full(len(model.landmarks), GRAY) if grays is None else grays
-    write_text(folder / "points3D.txt", "".join(_point_rows(model, values)))
+    write_text(folder / POINTS_FILE, "".join(_point_rows(model, values)))
 
 
 def write_images(model: Model, folder: Path, log: Path, channel_prefix: str) -> np.ndarray:

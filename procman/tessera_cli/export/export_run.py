@@ -6,7 +6,7 @@ from pathlib import Path
 from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.export import colmap
-from tessera_cli.files import absolute, replacing
+from tessera_cli.files import absolute, replacing, replacing_folder
 from tessera_cli.maps.map_file import read_map_file
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.runs.recorded_images import recording_of
@@ -43,13 +43,15 @@ def _export_mcap(folder: Path, target: Path, result: Result, replica: MapReplica
 def _export_colmap(folder: Path, target: Path, result: Result, replica: MapReplica) -> None:
     if target.is_file() or not target.parent.is_dir():
         raise UserError(f"{target} can't be made: name a new folder in one that exists, or a file that ends in .mcap.")
+    if target.is_dir() and any(entry.name not in colmap.CONTENT for entry in target.iterdir()):
+        raise UserError(f"{target} has other files than those of a model of COLMAP: name a new folder.")
     model, grays = colmap.model_of(replica), None
     recording = recording_of(folder, result.settings)
-    target.mkdir(exist_ok=True)
-    if recording:
-        (target / "images").mkdir(exist_ok=True)
-        grays = colmap.write_images(model, target / "images", *recording)
-    colmap.write_model(model, target, grays)
+    with replacing_folder(target) as written:
+        if recording:
+            (written / colmap.IMAGES).mkdir()
+            grays = colmap.write_images(model, written / colmap.IMAGES, *recording)
+        colmap.write_model(model, written, grays)
     error = float(model.errors_px.mean()) if len(model.errors_px) else 0.0
     say(f"{len(model.keyframes)} images, {len(model.landmarks)} points, mean error {error:.2f} px in {target}")
     if len(model.keyframes) < len(replica.keyframes):

@@ -12,6 +12,8 @@ from tessera_cli.maps.map_replica import MapError, MapReplica
 
 # Deltas kept behind a gap; more are dropped, and asked for when the gap is closed.
 MAX_WAITING = 256
+# Deltas that the mapper sends for one request (modules/map/map_exchange.h).
+MAX_ANSWERED = 16
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,11 @@ class Request:
     next_delta: int = -1
     snapshot: int = -1
     page: int = 0
+
+    def is_answered_with(self, asked: "Request") -> bool:
+        """Whether the answer to `asked` holds this too: while its deltas come in, the next one is missing each time."""
+        are_deltas = self.snapshot < 0 and asked.snapshot < 0
+        return self == asked or (are_deltas and 0 < self.next_delta - asked.next_delta < MAX_ANSWERED)
 
 
 class PartJoiner:

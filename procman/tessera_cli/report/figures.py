@@ -21,13 +21,15 @@ from tessera_cli.report.drawing import (
 from tessera_cli.report.path_figures import draw_errors, draw_paths
 from tessera_cli.report.svg import BAD, drawing_style, new_figure, to_svg
 from tessera_cli.report.time_figures import draw_cpu, draw_frame_rate, draw_pose_times, draw_steps
+from tessera_cli.report.voxel_picture import draw_voxels
 from tessera_cli.runs.run_folder import Frames, Result
 
 
 def draw_all(results: list[Result]) -> list[Drawing]:
     drawers = (draw_errors, draw_pose_times, draw_frame_rate, draw_cpu, draw_steps, draw_map_growth, draw_inliers)
     with drawing_style():
-        drawings = [*draw_paths(results), *(draw(results) for draw in drawers)]
+        voxels = draw_voxels(results[0]) if len(results) == 1 else None
+        drawings = [*draw_paths(results), voxels, *(draw(results) for draw in drawers)]
     return [drawing for drawing in drawings if drawing]
 
 

@@ -1,6 +1,7 @@
-"""A running stack as a scene: what each message of the bus shows, and what the map shows from time to time.
+"""A running stack as a scene: messages of the bus are passed in, and from time to time what they show comes out.
 
-It knows no bus and no clock: messages are passed in, and what is to be shown comes out.
+It knows no bus and no clock. What many messages tell is shown together, since a viewer takes in few large values in
+less time than many small ones.
 """
 
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from tessera_cli.maps.map_replica import CameraModel
 from tessera_cli.messages import pose_t
 from tessera_cli.runs.recorded_images import LeftImages, to_jpeg
 from tessera_cli.viewing import keypoints, map_shapes
+from tessera_cli.viewing.live_occupancy import LiveOccupancy
 from tessera_cli.viewing.live_path import LivePath
 from tessera_cli.viewing.scene import (
     CAMERA,
@@ -43,10 +45,12 @@ NUM_NEIGHBORS = 12
 
 
 class BusScene:
-    """Call the method of each message's channel; `map_shapes` and `pictures` when there is time for them."""
+    """Call the method of each message's channel; `motion`, `map_shapes` and `pictures` when there is time for them."""
 
     def __init__(self) -> None:
         self.follower = MapFollower()
+        self.occupancy = LiveOccupancy()
+        self.has_occupancy_stage = False
         self._path = LivePath()
         self._camera: CameraModel | None = None
         self._grid = (1, 1)
@@ -56,71 +60,84 @@ class BusScene:
         self._waiting_images: dict[int, np.ndarray] = {}
         self._waiting_features: dict[int, list[Any]] = {}  # keypoints_t, the parts of a frame
         self._joiner = PartJoiner(MAX_WAITING)
+        self._curves: dict[str, list[tuple[Moment, float]]] = {}  # that are not shown yet, by path
+        self._placed: list[tuple[Moment, Any]] = []  # poses of tracked frames that are not shown yet
         self._pictured = -1  # the last frame whose image was shown
         self._tracked = np.empty(0, int)  # landmarks in that image
         self._map_changed = False
         self._shown_camera: tuple[Any, ...] = ()
 
-    def on_calibration(self, message: Any) -> list[Shown]:
+    def on_calibration(self, message: Any) -> None:
         """A calibration_t."""
         self._camera = CameraModel.of(message.camera)
-        return []
 
-    def on_pose(self, message: Any) -> list[Shown]:
+    def on_pose(self, message: Any) -> None:
         """A pose_t."""
         moment = self._moment_of(message.frame, message.utime)
-        curves = {
-            f"{INLIERS}/matches": message.num_matches,
-            f"{INLIERS}/inliers": message.num_inliers,
-            f"{LATENCY}/latency": 1e-3 * message.latency,
-            f"{LATENCY}/map_wait": 1e-3 * message.map_wait_us,
-        }
-        shown: list[Shown] = [_curve(path, moment, value) for path, value in curves.items()]
-        if message.state != pose_t.TRACKED:
-            return shown
-        self._path.add(message)
-        rotation, position = message.world_from_camera.rotation_wxyz, message.world_from_camera.translation
-        frames, seconds = np.array([moment.frame]), np.array([moment.seconds])
-        xyzw, here = np.roll(rotation.astype(float), -1)[None], position.astype(float)[None]
-        return [*shown, Points(HERE, here, YELLOW, 4.0, moment), Poses(CAMERA, frames, seconds, here, xyzw)]
+        self._add_to_curve(f"{INLIERS}/matches", moment, message.num_matches)
+        self._add_to_curve(f"{INLIERS}/inliers", moment, message.num_inliers)
+        self._add_to_curve(f"{LATENCY}/latency", moment, 1e-3 * message.latency)
+        self._add_to_curve(f"{LATENCY}/map_wait", moment, 1e-3 * message.map_wait_us)
+        if message.state == pose_t.TRACKED:
+            self._path.add(message)
+            self._placed.append((moment, message.world_from_camera))
 
-    def on_truth(self, message: Any) -> list[Shown]:
+    def on_truth(self, message: Any) -> None:
         """A ground_truth_t."""
         self._path.add_truth(message)
-        return []
 
-    def on_status(self, message: Any) -> list[Shown]:
+    def on_status(self, message: Any) -> None:
         """A stage_status_t."""
         if message.name == "dispatcher":
             values = dict(zip(message.value_names, message.values))
             self._grid = (int(values.get("tile_lines", 1)), int(values.get("tile_columns", 1)))
-        return [_curve(f"{QUEUES}/{message.name}", self._moment, message.queue)] if self._moment else []
+        self.has_occupancy_stage |= message.name == "occupancy"
+        if self._moment:
+            self._add_to_curve(f"{QUEUES}/{message.name}", self._moment, message.queue)
 
-    def on_features(self, message: Any) -> list[Shown]:
+    def on_features(self, message: Any) -> None:
         """A features_t."""
         if self._camera is None:
             self._camera = CameraModel.of(message.keypoints.camera)  # the calibration was sent before we listened
         parts = self._joiner.add(message.keypoints.frame, message)
         if parts is not None:
             _keep(self._waiting_features, message.keypoints.frame, [part.keypoints for part in parts])
-        return []
 
-    def on_image(self, message: Any) -> list[Shown]:
+    def on_image(self, message: Any) -> None:
         """A camera_image_t."""
         image = self._images.add(message)
         if image is not None:
             _keep(self._waiting_images, message.frame, image)
-        return []
 
-    def on_delta(self, message: Any) -> list[Shown]:
+    def on_delta(self, message: Any) -> None:
         """A map_delta_t."""
         self._map_changed |= self.follower.on_delta(message)
-        return []
 
-    def on_page(self, message: Any) -> list[Shown]:
+    def on_page(self, message: Any) -> None:
         """A map_snapshot_t."""
         self._map_changed |= self.follower.on_page(message)
-        return []
+
+    def on_occupancy(self, message: Any) -> None:
+        """An occupancy_t."""
+        self.occupancy.on_update(message)
+
+    @property
+    def image_size(self) -> tuple[int, int] | None:
+        """Width and height in pixels, once they are known."""
+        return (self._camera.width, self._camera.height) if self._camera else None
+
+    def motion(self) -> Iterator[Shown]:
+        """Where the camera was, and the curves, since the last call."""
+        for path, points in self._curves.items():
+            yield Series(path, *_times_of(points), np.array([value for _, value in points], float))
+        self._curves.clear()
+        if not self._placed:
+            return
+        positions = np.array([placed.translation for _, placed in self._placed], float)
+        rotations_wxyz = np.array([placed.rotation_wxyz for _, placed in self._placed], float)
+        yield Poses(CAMERA, *_times_of(self._placed), positions, np.roll(rotations_wxyz, -1, axis=1))
+        yield Points(HERE, positions[-1:], YELLOW, 4.0, self._placed[-1][0])
+        self._placed.clear()
 
     def map_shapes(self) -> Iterator[Shown]:
         """The map as it is now, if it changed, and the paths in it."""
@@ -128,12 +145,13 @@ class BusScene:
         if self._map_changed:
             self._map_changed = False
             yield from map_shapes.shapes_of(replica)
-            yield from self._camera_shape(map_shapes.frustum_depth(replica))
+        yield from self._camera_shape(map_shapes.frustum_depth(replica))
         path = self._path.positions(replica)
         yield Lines(TRAJECTORY, [path] if len(path) > 1 else [], YELLOW, 2.0)
         truth = self._path.truth_in_map(replica, self._camera is None or self._camera.is_mono)
         if len(truth) > 1:
             yield Lines(TRUTH, [truth], GRAY, 2.0)
+        yield from self.occupancy.shapes()
 
     def pictures(self) -> Iterator[Shown]:
         """The newest image that was placed and not shown yet, with its keypoints."""
@@ -179,6 +197,9 @@ class BusScene:
         if borders := keypoints.tile_borders(*self._grid, self._camera.width, self._camera.height):
             yield Lines(TILES, borders, YELLOW, 1.0)
 
+    def _add_to_curve(self, path: str, moment: Moment, value: float) -> None:
+        self._curves.setdefault(path, []).append((moment, value))
+
     def _moment_of(self, frame: int, utime_us: int) -> Moment:
         if self._start_us is None:
             self._start_us = utime_us
@@ -188,8 +209,9 @@ class BusScene:
         return moment
 
 
-def _curve(path: str, moment: Moment, value: float) -> Series:
-    return Series(path, np.array([moment.frame]), np.array([moment.seconds]), np.array([float(value)]))
+def _times_of(entries: list[tuple[Moment, Any]]) -> tuple[np.ndarray, np.ndarray]:
+    """Frames and seconds."""
+    return np.array([moment.frame for moment, _ in entries]), np.array([moment.seconds for moment, _ in entries])
 
 
 def _keep(waiting: dict[int, Any], frame: int, value: Any) -> None:

@@ -10,11 +10,13 @@ import numpy as np
 
 from tessera_cli.maps.map_replica import CameraModel, Keyframe, MapReplica
 from tessera_cli.maps.poses import rotation_matrices
-from tessera_cli.viewing.scene import BLUE, GREEN, LOST, NEW, RED, TRACKED, Moment, Points, Shown
+from tessera_cli.viewing.scene import BLUE, GREEN, LOST, NEW, RED, TRACKED, Moment, Points, PointSeries, Shown
 
 # A keypoint shows a landmark that should be seen so near, and looks so much like it (bits of 256 that differ).
 MAX_DISTANCE_PX = 4.0
 MAX_BITS = 64
+# Widths on the screen.
+NEW_PX, LOST_PX, TRACKED_PX = 1.2, 1.8, 2.0
 
 
 @dataclass(frozen=True)
@@ -93,10 +95,22 @@ def _lost(
 
 
 def shapes_of(keypoints: Keypoints, moment: Moment) -> list[Shown]:
+    """Of one image."""
     return [
-        Points(NEW, keypoints.new, BLUE, 1.2, moment),
-        Points(LOST, keypoints.lost, RED, 1.8, moment),
-        Points(TRACKED, keypoints.tracked, GREEN, 2.0, moment),
+        Points(NEW, keypoints.new, BLUE, NEW_PX, moment),
+        Points(LOST, keypoints.lost, RED, LOST_PX, moment),
+        Points(TRACKED, keypoints.tracked, GREEN, TRACKED_PX, moment),
+    ]
+
+
+def series_of(keypoints: list[Keypoints], moments: list[Moment]) -> list[Shown]:
+    """Of several."""
+    frames = np.array([moment.frame for moment in moments])
+    seconds = np.array([moment.seconds for moment in moments])
+    return [
+        PointSeries(NEW, frames, seconds, [found.new for found in keypoints], BLUE, NEW_PX),
+        PointSeries(LOST, frames, seconds, [found.lost for found in keypoints], RED, LOST_PX),
+        PointSeries(TRACKED, frames, seconds, [found.tracked for found in keypoints], GREEN, TRACKED_PX),
     ]
 
 

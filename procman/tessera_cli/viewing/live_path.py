@@ -1,57 +1,68 @@
 """The path of the camera while the map still changes: each pose moves along with its reference keyframe."""
 
+from collections import deque
 from typing import Any
 
 import numpy as np
 
 from tessera_cli.maps.map_replica import MapReplica, Tie
-from tessera_cli.maps.poses import multiply, rotate
+from tessera_cli.maps.poses import multiply, rotate, rotation_matrices
 
 # Removed keyframes whose parents were removed too, and so on.
 MAX_CHAIN = 10_000
 MIN_ALIGNED = 10
+# Poses that are kept whole.
+MAX_NEWEST = 32
+NOWHERE = (np.array([1.0, 0, 0, 0]), np.zeros(3), 1.0)
 
 
 class LivePath:
     """Poses of tracked frames, and the truth of as many of them as came."""
 
     def __init__(self) -> None:
-        self._poses: list[Any] = []  # pose_t
+        self._frames: list[int] = []
+        self._references: list[int] = []  # numbers of their reference keyframes
+        self._in_reference: list[np.ndarray] = []  # positions relative to these
+        self._published: list[np.ndarray] = []  # positions in the world as it was then
+        self._newest: deque[Any] = deque(maxlen=MAX_NEWEST)  # pose_t
         self._truth: dict[int, np.ndarray] = {}  # by frame
 
     def add(self, pose: Any) -> None:
-        if not self._poses or pose.frame > self._poses[-1].frame:
-            self._poses.append(pose)
+        if self._frames and pose.frame <= self._frames[-1]:
+            return
+        self._frames.append(pose.frame)
+        self._references.append(pose.reference_keyframe)
+        self._in_reference.append(pose.reference_from_camera.translation)
+        self._published.append(pose.world_from_camera.translation)
+        self._newest.append(pose)
 
     def add_truth(self, message: Any) -> None:
         self._truth[message.frame] = message.world_from_camera.translation.astype(float)
 
     def newest(self, number: int) -> list[Any]:
-        return self._poses[-number:]
+        """At most MAX_NEWEST."""
+        return list(self._newest)[-number:]
 
     def positions(self, replica: MapReplica) -> np.ndarray:
         """N x 3, in the map as it is now. Where the keyframe is unknown, as it was published."""
-        if not self._poses:
+        if not self._frames:
             return np.empty((0, 3))
-        places = {number: _place(replica, number) for number in {pose.reference_keyframe for pose in self._poses}}
-        path = np.array([pose.world_from_camera.translation for pose in self._poses], float)
-        for number, place in places.items():
-            if place is None:
-                continue
-            rows = [row for row, pose in enumerate(self._poses) if pose.reference_keyframe == number]
-            rotation, translation, scale = place
-            relative = np.array([self._poses[row].reference_from_camera.translation for row in rows], float)
-            path[rows] = scale * rotate(rotation, relative) + translation
-        return path
+        numbers, which = np.unique(self._references, return_inverse=True)
+        places = [_place(replica, number) for number in numbers.tolist()]
+        is_known = np.array([place is not None for place in places])[which]
+        rotations, translations, scales = zip(*(place or NOWHERE for place in places))
+        turned = np.einsum("nij,nj->ni", rotation_matrices(np.array(rotations))[which], np.array(self._in_reference))
+        moved = np.array(scales)[which, None] * turned + np.array(translations)[which]
+        return np.where(is_known[:, None], moved, np.array(self._published))
 
     def truth_in_map(self, replica: MapReplica, with_scale: bool) -> np.ndarray:
         """N x 3 of the true path, aligned to the estimate; empty before both are long enough for that."""
         from evo.core.geometry import GeometryException, umeyama_alignment
 
-        known = [row for row, pose in enumerate(self._poses) if pose.frame in self._truth]
+        known = [row for row, frame in enumerate(self._frames) if frame in self._truth]
         if len(known) < MIN_ALIGNED:
             return np.empty((0, 3))
-        truth = np.array([self._truth[self._poses[row].frame] for row in known])
+        truth = np.array([self._truth[self._frames[row]] for row in known])
         try:
             rotation, translation, scale = umeyama_alignment(truth.T, self.positions(replica)[known].T, with_scale)
         except GeometryException:

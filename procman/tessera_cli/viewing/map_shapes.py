@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tessera_cli.maps.colors import height_colors
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.maps.poses import rotation_matrices
 from tessera_cli.viewing.scene import (
@@ -10,6 +11,7 @@ from tessera_cli.viewing.scene import (
     FAINT,
     KEYFRAMES,
     LANDMARKS,
+    LOOP_ENDS,
     LOOPS,
     RED,
     Lines,
@@ -22,10 +24,6 @@ MIN_SHARED = 100
 # Of the median distance between neighboring keyframes.
 FRUSTUM_DEPTH = 0.35
 DEFAULT_FRUSTUM_DEPTH = 0.1
-# Landmarks between these quantiles of height spread over all colors.
-LOW, HIGH = 0.05, 0.95
-# From low to high.
-HEIGHT_COLORS = np.array([[66, 94, 168], [60, 160, 160], [150, 200, 110], [250, 220, 120]], float)
 
 
 def shapes_of(replica: MapReplica) -> list[Shown]:
@@ -46,12 +44,14 @@ def shapes_of(replica: MapReplica) -> list[Shown]:
         Lines(KEYFRAMES, frusta(replica, depth), BLUE, 1.0),
         Lines(COVISIBILITY, pairs, FAINT, 0.6),
         Lines(LOOPS, loops, RED, 3.0),
+        # Where the map agrees with itself a loop is too short to be seen as a line.
+        Points(LOOP_ENDS, np.concatenate([np.empty((0, 3)), *loops]), RED, 4.0),
     ]
 
 
 def frustum_depth(replica: MapReplica) -> float:
-    """Fits the map, whose unit may be anything."""
-    centers = np.array([keyframe.translation for _, keyframe in sorted(replica.keyframes.items())])
+    """Fits the map, whose unit may be anything. Something where there is no map yet."""
+    centers = np.array([keyframe.translation for _, keyframe in sorted(replica.keyframes.items())]).reshape(-1, 3)
     steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
     steps = steps[steps > 0]
     return FRUSTUM_DEPTH * float(np.median(steps)) if len(steps) else DEFAULT_FRUSTUM_DEPTH
@@ -92,14 +92,3 @@ def covisible_pairs(replica: MapReplica, min_shared: int = MIN_SHARED) -> list[t
         found = zip(shared.row[is_pair].tolist(), shared.col[is_pair].tolist())
         pairs |= {(numbers[a], numbers[b]) for a, b in found}
     return sorted(pairs)
-
-
-def height_colors(positions: np.ndarray) -> np.ndarray:
-    """N x 3 bytes: y points down, so the smallest are the highest."""
-    if not len(positions):
-        return np.empty((0, 3), np.uint8)
-    height = -positions[:, 1]
-    low, high = np.quantile(height, [LOW, HIGH])
-    share = np.clip((height - low) / max(high - low, 1e-9), 0, 1) * (len(HEIGHT_COLORS) - 1)
-    steps = np.arange(len(HEIGHT_COLORS))
-    return np.stack([np.interp(share, steps, column) for column in HEIGHT_COLORS.T], axis=1).astype(np.uint8)

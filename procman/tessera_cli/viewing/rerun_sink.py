@@ -7,8 +7,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from tessera_cli.errors import RunError
 from tessera_cli.maps.occupancy_file import UNKNOWN_GRAY
 from tessera_cli.viewing.scene import (
+    CURVE_COLORS,
     HERE,
     IMAGE,
     WORLD,
@@ -19,6 +21,7 @@ from tessera_cli.viewing.scene import (
     Moment,
     Picture,
     Points,
+    PointSeries,
     Poses,
     Series,
     Shown,
@@ -42,13 +45,22 @@ class RerunSink:
             sinks.append(rr.GrpcSink(viewer_url))
         if path:
             sinks.append(rr.FileSink(path))
-        self._recording.set_sinks(*sinks, default_blueprint=_blueprint(look))
+        try:
+            self._recording.set_sinks(*sinks, default_blueprint=_blueprint(look))
+        except RuntimeError as error:
+            raise RunError(f"the view can't be written: {error}") from error
         self._recording.send_recording_name(title)
         self._recording.log(WORLD, rr.ViewCoordinates.RDF, static=True)
+        for curve, color in CURVE_COLORS.items():
+            self._recording.log(curve, rr.SeriesLines(colors=color, names=curve.rpartition("/")[2]), static=True)
+
+    def arrange(self, look: Look) -> None:
+        """Anew, as at the start."""
+        self._recording.send_blueprint(_blueprint(look))
 
     def show(self, shown: Shown) -> None:
         moment = getattr(shown, "moment", None)
-        if isinstance(shown, Poses | Series):
+        if isinstance(shown, Poses | Series | PointSeries):
             self._send_columns(shown)
         else:
             if moment is not None:
@@ -71,12 +83,20 @@ class RerunSink:
         self._recording.set_time(FRAME, sequence=moment.frame)
         self._recording.set_time(TIME, duration=moment.seconds)
 
-    def _send_columns(self, shown: Poses | Series) -> None:
+    def _send_columns(self, shown: Poses | Series | PointSeries) -> None:
+        """All frames at once."""
+        if not len(shown.frames):
+            return
         times = [rr.TimeColumn(FRAME, sequence=shown.frames), rr.TimeColumn(TIME, duration=shown.seconds)]
         if isinstance(shown, Series):
             columns = rr.Scalars.columns(scalars=shown.values)
-        else:
+        elif isinstance(shown, Poses):
             columns = rr.Transform3D.columns(translation=shown.translations, quaternion=shown.quaternions_xyzw)
+        else:
+            look = rr.Points2D.from_fields(colors=[shown.color], radii=rr.Radius.ui_points(shown.width_px))
+            self._recording.log(shown.path, look, static=True)
+            points = rr.Points2D.columns(positions=np.concatenate(shown.positions))
+            columns = points.partition([len(positions) for positions in shown.positions])
         self._recording.send_columns(shown.path, times, columns)
 
 
@@ -133,12 +153,29 @@ def _blueprint(look: Look) -> Any:
     else:
         eye = rrb.EyeControls3D(position=look.eye, look_target=look.target, eye_up=(0, -1, 0))
     world = rrb.Spatial3DView(origin=WORLD, name="map", eye_controls=eye, background=(18, 20, 24), line_grid=False)
-    image = rrb.Spatial2DView(origin=IMAGE, name="image: tracked, new, lost")
-    plots = [rrb.TimeSeriesView(origin=path, name=title) for path, title in look.plots]
+    # Lost keypoints may lie outside of the image; it fills its place all the same.
+    bounds = (
+        rrb.VisualBounds2D(x_range=(0, look.image_size[0]), y_range=(0, look.image_size[1]))
+        if look.image_size
+        else None
+    )
+    image = rrb.Spatial2DView(origin=IMAGE, name="image: tracked, new, lost", visual_bounds=bounds)
+    plots = [_plot(path, title) for path, title in look.plots]
     side = rrb.Vertical(image, *plots, row_shares=[2] + [1] * len(plots))
     return rrb.Blueprint(
         rrb.Horizontal(world, side, column_shares=[2, 1]),
         rrb.TimePanel(state="collapsed", timeline=FRAME),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
+    )
+
+
+def _plot(path: str, title: str) -> Any:
+    """The curves of all frames."""
+    everything = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    return rrb.TimeSeriesView(
+        origin=path,
+        name=title,
+        axis_x=rrb.archetypes.TimeAxis(view_range=everything),
+        plot_legend=rrb.Corner2D.LeftTop,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tessera_cli.maps.map_replica import MapReplica
+from tessera_cli.report.viewpoint import over_the_shoulder
 from tessera_cli.runs.recorded_images import left_images, to_jpeg
 from tessera_cli.runs.run_folder import SAME_TIME_S, Frames, Result
 from tessera_cli.runs.trajectories import Trajectory, truth_in_estimate
@@ -17,22 +18,43 @@ from tessera_cli.viewing.scene import (
     CAMERA,
     CAMERA_SIZE,
     ERROR,
+    ERROR_PLOT,
     GRAY,
     IMAGE,
     INLIERS,
+    INLIERS_PLOT,
     LATENCY,
+    LATENCY_PLOT,
     TILES,
     TRAJECTORY,
     TRUTH,
     YELLOW,
     Camera,
     Lines,
+    Look,
     Moment,
     Picture,
     Poses,
     Series,
     Shown,
 )
+
+
+def look_of(result: Result, replica: MapReplica) -> Look:
+    """From behind and above, so that the path of the camera is in sight; where it hardly moved, what it saw."""
+    assert result.estimate is not None
+    plots = (INLIERS_PLOT, LATENCY_PLOT, *([ERROR_PLOT] if result.error else []))
+    camera = next((keyframe.camera for keyframe in replica.keyframes.values()), None)
+    image_size = (camera.width, camera.height) if camera else None
+    low, high = result.estimate.positions.min(axis=0), result.estimate.positions.max(axis=0)
+    size = max(float(np.linalg.norm(high - low)), 1e-3)
+    landmarks = replica.positions[replica.landmark_ids()]
+    if len(landmarks):
+        shoulder = over_the_shoulder(landmarks, result.estimate)
+        if shoulder.reach > size:
+            return Look(plots, image_size, shoulder.eye, shoulder.target)
+    target = (low + high) / 2
+    return Look(plots, image_size, target + size * np.array([0.0, -0.95, -0.7]), target)
 
 
 def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:
@@ -57,11 +79,12 @@ def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:
 def keyframe_keypoints(result: Result, replica: MapReplica) -> Iterator[Shown]:
     """The keypoints of each keyframe, at its frame."""
     before = np.empty(0, int)
+    moments, found = [], []
     for moment, number in keyframe_moments(result, replica):
-        keyframe = replica.keyframes[number]
-        found = keypoints.of_keyframe(keyframe, replica, before)
-        before = found.landmarks
-        yield from keypoints.shapes_of(found, moment)
+        found.append(keypoints.of_keyframe(replica.keyframes[number], replica, before))
+        before = found[-1].landmarks
+        moments.append(moment)
+    yield from keypoints.series_of(found, moments)
 
 
 def keyframe_pictures(result: Result, replica: MapReplica, log: Path, channel_prefix: str) -> Iterator[Picture]:

@@ -17,6 +17,7 @@ Color: TypeAlias = tuple[int, int, int]
 WORLD = "world"
 TRUTH, TRAJECTORY = f"{WORLD}/truth", f"{WORLD}/trajectory"
 KEYFRAMES, COVISIBILITY, LOOPS = f"{WORLD}/keyframes", f"{WORLD}/covisibility", f"{WORLD}/loops"
+LOOP_ENDS = f"{LOOPS}/ends"
 LANDMARKS = f"{WORLD}/landmarks"
 VOXELS, FLOOR = f"{WORLD}/occupancy/voxels", f"{WORLD}/occupancy/grid"
 CAMERA = f"{WORLD}/camera"
@@ -34,6 +35,17 @@ YELLOW: Color = (240, 190, 60)
 FAINT: Color = (60, 95, 70)
 
 
+# Of curves; those that are not named here get one from the viewer.
+CURVE_COLORS: dict[str, Color] = {
+    f"{INLIERS}/matches": YELLOW,
+    f"{INLIERS}/inliers": GREEN,
+    f"{LATENCY}/latency": RED,
+    f"{LATENCY}/map_wait": YELLOW,
+    f"{LATENCY}/pose_time": BLUE,
+    f"{ERROR}/position": YELLOW,
+}
+
+
 @dataclass(frozen=True)
 class Moment:
     frame: int
@@ -49,6 +61,18 @@ class Points:
     colors: Color | np.ndarray  # one, or n x 3
     width_px: float  # on the screen
     moment: Moment | None = None
+
+
+@dataclass(frozen=True)
+class PointSeries:
+    """Points in the images of n frames."""
+
+    path: str
+    frames: np.ndarray
+    seconds: np.ndarray
+    positions: list[np.ndarray]  # n, each k x 2, px
+    color: Color
+    width_px: float
 
 
 @dataclass(frozen=True)
@@ -124,7 +148,7 @@ class Floor:
     down: np.ndarray  # 3, from one row to the next
 
 
-Shown: TypeAlias = Points | Lines | Camera | Poses | Series | Picture | Voxels | Floor
+Shown: TypeAlias = Points | PointSeries | Lines | Camera | Poses | Series | Picture | Voxels | Floor
 
 
 # A plot: where its curves stand, and its title.
@@ -134,16 +158,9 @@ QUEUES_PLOT, ERROR_PLOT = (QUEUES, "queue lengths"), (ERROR, "distance from the 
 
 @dataclass(frozen=True)
 class Look:
-    """Which plots there are, and from where the world is seen first."""
+    """Which plots there are, how large the image is, and from where the world is seen first."""
 
     plots: tuple[tuple[str, str], ...]
+    image_size: tuple[int, int] | None = None  # width and height, px; None: not known yet
     eye: np.ndarray | None = None  # None: it follows the camera
     target: np.ndarray | None = None
-
-
-def look_at_path(positions: np.ndarray, *plots: tuple[str, str]) -> Look:
-    """From behind and above, so that the path of the camera (n x 3, of at least one) is in sight."""
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    size = max(float(np.linalg.norm(high - low)), 1e-3)
-    target = (low + high) / 2
-    return Look(plots, target + size * np.array([0.0, -0.95, -0.7]), target)

@@ -11,8 +11,8 @@ from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.runs.recorded_images import recording_of
 from tessera_cli.runs.run_folder import Result, read_run
 from tessera_cli.viewing.occupancy import occupancy_of
-from tessera_cli.viewing.run_scene import keyframe_keypoints, keyframe_pictures, scene_of
-from tessera_cli.viewing.scene import ERROR_PLOT, INLIERS_PLOT, LATENCY_PLOT, Shown, look_at_path
+from tessera_cli.viewing.run_scene import keyframe_keypoints, keyframe_pictures, look_of, scene_of
+from tessera_cli.viewing.scene import Shown
 from tessera_cli.viewing.window import open_view, show_recording
 
 
@@ -30,13 +30,14 @@ def view_run(arguments: Namespace) -> int:
         result, replica = read_run(folder), read_map_file(folder / "map.tessera")
         if result.estimate is None:
             raise UserError(f"{folder}: no frame was tracked, so that there is nothing to show.")
-        plots = (INLIERS_PLOT, LATENCY_PLOT, *([ERROR_PLOT] if result.error else []))
-        sink = view.start(look_at_path(result.estimate.positions, *plots))
+        sink = view.start(look_of(result, replica))
         for shown in scene_of(result, replica):
             sink.show(shown)
         view.tell()
         for shown in later(folder, result, replica):
             if view.is_over:
+                if arguments.save:
+                    raise KeyboardInterrupt  # no file with a part of the view
                 break
             sink.show(shown)
         view.wait()
@@ -45,7 +46,7 @@ def view_run(arguments: Namespace) -> int:
 
 def later(folder: Path, result: Result, replica: MapReplica) -> Iterator[Shown]:
     """What takes long to read, shown when the rest is there."""
-    yield from occupancy_of(folder, result)
+    yield from occupancy_of(result)
     yield from keyframe_keypoints(result, replica)
     if recording := recording_of(folder, result.settings):
         yield from keyframe_pictures(result, replica, *recording)

@@ -17,6 +17,8 @@ POLL_S = 0.02
 STOP_TIMEOUT_S = 3.0
 # The viewer drops the oldest of what it was sent when this is full.
 MEMORY_LIMIT = "25%"
+# Of the page: no advertisement while the view is loaded, and images on a dark ground as in a window.
+PAGE_OPTIONS = "hide_welcome_screen&theme=dark"
 
 
 class ViewerProcess:
@@ -35,11 +37,13 @@ class ViewerProcess:
         if recording:
             command.append(str(recording))
         if web_port is None:
-            command += ["--memory-limit", MEMORY_LIMIT, "--expect-data-soon"]
+            command += ["--memory-limit", MEMORY_LIMIT, "--expect-data-soon", "--hide-welcome-screen"]
         else:
             _require_free(web_port)
             command += ["--serve-web", "--web-viewer-port", str(web_port), "--server-memory-limit", MEMORY_LIMIT]
-            self.page = f"http://{LOOPBACK}:{web_port}?url={self.url.replace('+', '%2B')}"
+            # A page that is opened late shows at once what is newest.
+            command.append("--newest-first")
+            self.page = f"http://{LOOPBACK}:{web_port}?url={self.url.replace('+', '%2B')}&{PAGE_OPTIONS}"
         self._port = port
         self._process = subprocess.Popen(
             command,
@@ -92,6 +96,12 @@ class ViewerProcess:
         if self._is_window:
             return f"the viewer's window could not be kept open ({reason}); --web shows the view in a browser instead."
         return f"the web viewer ended ({reason})."
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a file of the viewer has its end. Nobody hears of it where one can't be written any further."""
+    command = [_program(), "rrd", "verify", str(path)]
+    return subprocess.run(command, capture_output=True, env={**os.environ, **_quiet_environment()}).returncode == 0
 
 
 def has_display() -> bool:

@@ -14,7 +14,7 @@ from tessera_cli.errors import RunError, UserError
 from tessera_cli.files import absolute, replacing
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.viewing.scene import Look
-from tessera_cli.viewing.viewer_process import ViewerProcess, has_display
+from tessera_cli.viewing.viewer_process import ViewerProcess, has_display, is_whole
 
 if TYPE_CHECKING:
     from tessera_cli.viewing.rerun_sink import RerunSink
@@ -85,6 +85,8 @@ def open_view(arguments: Namespace, title: str) -> Iterator[View]:
         else:
             with replacing(path) as written:
                 yield from _view(title, process, written)
+                if not is_whole(written):
+                    raise RunError(f"{path} could not be written whole: is there room on the disk?")
             say(f"the view is in {path}; procman/tessera view {path} shows it")
     finally:
         if process:
@@ -96,6 +98,8 @@ def show_recording(arguments: Namespace, recording: Path) -> None:
     require_package()
     if not recording.is_file():
         raise UserError(f"{recording}: there is no such file.")
+    if not is_whole(recording):
+        say(f"{recording} is cut off or damaged: what can be read of it is shown")
     process = _open_viewer(arguments, recording)
     view = View(recording.stem, process, None)
     try:

@@ -1,5 +1,6 @@
 """Files that hold the map are read as they were written, and damaged ones are refused in a sentence."""
 
+import struct
 from pathlib import Path
 
 import lcm
@@ -13,6 +14,7 @@ from tessera_cli.maps.occupancy_file import DEFAULT_AXES, read_grid, read_voxels
 from tessera_cli.messages import message_types as tessera
 
 BT_HEADER = b"# Octomap OcTree binary file\n# a comment\nid OcTree\nsize 18\nres 0.5\ndata\n"
+OT_HEADER = b"# Octomap OcTree file\n# a comment\n#\nid ColorOcTree\nsize 18\nres 0.5\ndata\n"
 DEPTH = 16
 INNER_FIRST, INNER_LAST, OCCUPIED_FIRST = 3, 3 << 14, 2
 
@@ -63,6 +65,32 @@ def test_occupied_voxels_stand_where_octomap_puts_them(tmp_path: Path) -> None:
     assert voxels.sizes.tolist() == [0.5]
     (tmp_path / "cube.bt").write_bytes(BT_HEADER + tree[:-4] + node(OCCUPIED_FIRST))
     assert read_voxels(tmp_path / "cube.bt").sizes.tolist() == [1.0], "eight voxels that are pruned into one"
+
+
+def color_node(log_odds: float, gray: int, children: int) -> bytes:
+    return struct.pack("<f4B", log_odds, gray, gray, gray, children)
+
+
+def test_colored_trees_have_gray_values_and_branches_follow_one_another(tmp_path: Path) -> None:
+    # The last child of the root (the positive octant) and its first one down to the smallest voxels, of which two are
+    # there; behind them the octant's last child, a leaf that is free.
+    leaves = color_node(0.8, 90, 0) + color_node(1.5, 200, 0)
+    inner = color_node(1.5, 0, 0b10000001) + color_node(1.5, 0, 1) * (DEPTH - 3) + color_node(1.5, 0, 0b11) + leaves
+    tree = color_node(1.5, 0, 0b10000000) + inner + color_node(-0.4, 255, 0)
+    (tmp_path / "one.ot").write_bytes(OT_HEADER + tree)
+    voxels = read_voxels(tmp_path / "one.ot")
+    assert voxels.centers.tolist() == [[0.25, 0.25, 0.25], [0.75, 0.25, 0.25]]
+    assert voxels.grays is not None and voxels.grays.tolist() == [90, 200]
+    for damaged in (tree[:-8], tree[:-3], tree + leaves):
+        (tmp_path / "one.ot").write_bytes(OT_HEADER + damaged)
+        with pytest.raises(UserError, match=r"one\.ot: is cut off"):
+            read_voxels(tmp_path / "one.ot")
+
+
+def test_a_tree_without_nodes_has_no_voxels(tmp_path: Path) -> None:
+    for name, header in {"map.bt": BT_HEADER, "map.ot": OT_HEADER}.items():
+        (tmp_path / name).write_bytes(header)
+        assert len(read_voxels(tmp_path / name).sizes) == 0
 
 
 @pytest.mark.parametrize("data", [b"", b"no tree", BT_HEADER + node(INNER_FIRST), BT_HEADER + node(INNER_FIRST) * 40])

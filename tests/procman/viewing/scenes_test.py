@@ -18,15 +18,18 @@ from helpers.made_map import (
     two_views,
 )
 from helpers.made_run import NUM_FRAMES, write_run
+from tessera_cli.maps.colors import DARKEST, HEIGHT_COLORS, gray_colors, height_colors
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.messages import message_types as tessera
+from tessera_cli.report.viewpoint import over_the_shoulder
 from tessera_cli.runs.recorded_images import LeftImages
 from tessera_cli.runs.run_folder import read_run
-from tessera_cli.runs.trajectories import truth_in_estimate
+from tessera_cli.runs.trajectories import Trajectory, truth_in_estimate
 from tessera_cli.viewing import map_shapes, scene
 from tessera_cli.viewing.bus_scene import BusScene
-from tessera_cli.viewing.map_shapes import covisible_pairs, height_colors
-from tessera_cli.viewing.run_scene import scene_of, tiles_of
+from tessera_cli.viewing.live_occupancy import LiveOccupancy
+from tessera_cli.viewing.map_shapes import covisible_pairs
+from tessera_cli.viewing.run_scene import look_of, scene_of, tiles_of
 
 
 def made_replica() -> MapReplica:
@@ -51,6 +54,31 @@ def test_a_run_shows_path_truth_map_and_curves(tmp_path: Path) -> None:
     assert len(shown[f"{scene.LATENCY}/pose_time"].frames) == NUM_FRAMES - 1, "the first frame has none"
     poses = shown[scene.CAMERA]
     assert poses.frames[-1] == NUM_FRAMES - 1 and poses.seconds[-1] == pytest.approx(0.1 * (NUM_FRAMES - 1))
+
+
+def test_the_eye_sees_the_whole_path_or_what_the_camera_saw(tmp_path: Path) -> None:
+    result = read_run(write_run(tmp_path / "run"))
+    assert result.estimate is not None
+    look = look_of(result, made_replica())
+    assert look.eye is not None and look.target is not None
+    middle = (result.estimate.positions.min(axis=0) + result.estimate.positions.max(axis=0)) / 2
+    assert is_close(look.target, middle)
+    assert look.eye[1] < -20, "from above: y points down"
+    assert look.plots[0] == scene.INLIERS_PLOT
+    far = made_replica()
+    far.positions *= 1000
+    look = look_of(result, far)
+    assert look.target is not None and np.linalg.norm(look.target - middle) > 100, "it hardly moved"
+
+
+def test_the_eye_stands_behind_and_above_the_camera_that_sees_most() -> None:
+    turned = [0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]  # looks along x
+    poses = Trajectory(np.arange(2.0), np.zeros((2, 3)), np.array([[0.0, 0, 0, 1], turned]), has_times=True)
+    view = over_the_shoulder(np.array([[0.0, 0, 9], [10, 1, 0], [10, -1, 1]]), poses)
+    assert is_close(view.target, [10, 0, 0]) and view.distance == pytest.approx(10)
+    assert view.eye[0] < 0 and view.eye[1] < 0
+    assert is_close(view.world_from_eye @ view.world_from_eye.T, np.eye(3))
+    assert view.world_from_eye[0, 2] > 0.9 and view.world_from_eye[1, 1] > 0.9
 
 
 def test_the_truth_lies_on_the_estimate(tmp_path: Path) -> None:
@@ -107,15 +135,30 @@ def make_truth(frame: int, y: float) -> Any:
     return received(truth)
 
 
-def test_a_pose_shows_the_camera_and_its_measures() -> None:
+def test_poses_show_the_camera_and_their_measures_together() -> None:
     bus = BusScene()
     bus.on_pose(make_pose_message(10, 0.0))
-    shown = by_path(bus.on_pose(make_pose_message(12, 0.2)))
-    assert shown[f"{scene.INLIERS}/inliers"].values.tolist() == [123]
-    assert shown[f"{scene.LATENCY}/latency"].values.tolist() == [30]
-    assert shown[scene.CAMERA].frames.tolist() == [12]
-    assert shown[scene.CAMERA].seconds.tolist() == [pytest.approx(0.2)]
+    bus.on_pose(make_pose_message(12, 0.2))
+    shown = by_path(bus.motion())
+    assert shown[f"{scene.INLIERS}/inliers"].values.tolist() == [123, 123]
+    assert shown[f"{scene.LATENCY}/latency"].values.tolist() == [30, 30]
+    assert shown[scene.CAMERA].frames.tolist() == [10, 12]
+    assert shown[scene.CAMERA].seconds.tolist() == [0, pytest.approx(0.2)]
+    assert is_close(shown[scene.CAMERA].translations, [[0, 0, 0], [0.2, 0, 0]])
+    assert is_close(shown[scene.CAMERA].quaternions_xyzw, [[0, 0, 0, 1]] * 2)
     assert is_close(shown[scene.HERE].positions, [[0.2, 0, 0]])
+    assert shown[scene.HERE].moment.frame == 12
+    assert list(bus.motion()) == [], "each once"
+
+
+def test_a_lost_frame_has_measures_and_no_camera() -> None:
+    bus = BusScene()
+    pose = make_pose_message(3, 0.0)
+    pose.state = pose.LOST
+    bus.on_pose(pose)
+    shown = by_path(bus.motion())
+    assert shown[f"{scene.INLIERS}/inliers"].frames.tolist() == [3]
+    assert scene.CAMERA not in shown and scene.HERE not in shown
 
 
 def test_the_path_moves_along_with_keyframes_also_removed_ones() -> None:
@@ -156,11 +199,12 @@ def test_queues_stand_at_the_frame_of_the_moment() -> None:
     status = set_header(tessera.stage_status_t())
     status.name, status.queue = "mapper", 4
     bus = BusScene()
-    assert bus.on_status(received(status)) == []
+    bus.on_status(received(status))
+    assert list(bus.motion()) == [], "no frame is known yet"
     bus.on_pose(make_pose_message(7, 0.0))
-    (curve,) = bus.on_status(received(status))
-    assert isinstance(curve, scene.Series)
-    assert (curve.path, curve.frames.tolist(), curve.values.tolist()) == (f"{scene.QUEUES}/mapper", [7], [4])
+    bus.on_status(received(status))
+    curve = by_path(bus.motion())[f"{scene.QUEUES}/mapper"]
+    assert (curve.frames.tolist(), curve.values.tolist()) == ([7], [4])
 
 
 def test_the_newest_image_is_shown_with_its_keypoints_once() -> None:
@@ -175,6 +219,71 @@ def test_the_newest_image_is_shown_with_its_keypoints_once() -> None:
     assert is_close(shown[scene.TRACKED].positions, [[320, 240]])
     assert is_close(shown[scene.NEW].positions, [[100, 100]])
     assert list(bus.pictures()) == []
+
+
+def make_occupancy(number: int, occupied: dict[tuple[int, int, int], list[int]], is_whole: bool = False) -> Any:
+    """Of each block, the numbers of the voxels that are occupied; the others are free."""
+    message = set_header(tessera.occupancy_t())
+    message.number, message.resolution, message.is_whole = number, 0.5, is_whole
+    for (x, y, z), voxels in occupied.items():
+        block = tessera.occupancy_block_t()
+        states = np.full(4096, block.FREE, np.uint8)
+        states[voxels] = block.OCCUPIED
+        packed = np.bitwise_or.reduce([states[place::4] << 2 * place for place in range(4)])
+        block.x, block.y, block.z, block.states = x, y, z, packed.astype(np.uint8).tobytes()
+        message.blocks.append(block)
+    message.num_blocks = len(message.blocks)
+    return received(message)
+
+
+def voxels_of(shapes: Any) -> dict[str, list[list[float]]]:
+    return {shape.path: sorted(shape.centers.tolist()) for shape in shapes}
+
+
+def test_occupancy_is_shown_where_it_changed() -> None:
+    occupancy = LiveOccupancy()
+    occupancy.on_update(make_occupancy(0, {(0, 0, 0): [0, 17 + 256], (-1, 0, 9): [5]}, is_whole=True))
+    assert not occupancy.lacks_whole
+    shown = voxels_of(occupancy.shapes())
+    assert shown == {
+        f"{scene.VOXELS}/0_0_0": [[0.25, 0.25, 0.25], [0.75, 0.75, 0.75]],
+        f"{scene.VOXELS}/-1_0_2": [[0.5 * (5.5 - 16), 0.25, 0.5 * (0.5 + 9 * 16)]],
+    }
+    assert list(occupancy.shapes()) == []
+    occupancy.on_update(make_occupancy(1, {(0, 0, 0): []}))
+    assert voxels_of(occupancy.shapes()) == {f"{scene.VOXELS}/0_0_0": []}, "what is free now is taken away"
+
+
+def test_the_whole_occupancy_is_wanted_at_the_start_and_behind_a_gap() -> None:
+    occupancy = LiveOccupancy()
+
+    def lacks_whole_after(message: Any) -> bool:
+        occupancy.on_update(message)
+        return occupancy.lacks_whole
+
+    assert lacks_whole_after(make_occupancy(6, {(0, 0, 0): [0]}))
+    assert not lacks_whole_after(make_occupancy(7, {(8, 0, 0): [1]}, is_whole=True))
+    assert voxels_of(occupancy.shapes())[f"{scene.VOXELS}/0_0_0"] == [], "it is not among the whole"
+    assert not lacks_whole_after(make_occupancy(8, {(8, 0, 0): [2]}))
+    assert lacks_whole_after(make_occupancy(10, {(8, 0, 0): [3]}))
+
+
+def test_colors_are_chosen_anew_when_heights_grow() -> None:
+    occupancy = LiveOccupancy()
+    occupancy.on_update(make_occupancy(0, {(0, 0, 0): [0]}, is_whole=True))
+    list(occupancy.shapes())
+    occupancy.on_update(make_occupancy(1, {(0, -40, 0): [0]}))
+    shown = by_path(occupancy.shapes())
+    assert len(shown) == 2, "also the region that did not change"
+    low, high = shown[f"{scene.VOXELS}/0_0_0"].colors[0], shown[f"{scene.VOXELS}/0_-10_0"].colors[0]
+    assert low.tolist() == HEIGHT_COLORS[0].tolist() and high.tolist() == [250, 220, 120]
+
+
+def test_gray_values_spread_over_what_a_screen_shows() -> None:
+    colors = gray_colors(np.arange(20, 60))
+    assert colors[0].tolist() == [DARKEST] * 3 and colors[-1].tolist() == [255] * 3
+    assert (np.diff(colors[:, 0].astype(int)) >= 0).all()
+    assert gray_colors(np.empty(0)).shape == (0, 3)
 
 
 def make_band(frame: int, y: int, rows: int, value: int, image: int = 0) -> Any:
@@ -198,6 +307,13 @@ def test_images_are_put_together_from_bands() -> None:
 
 def test_bands_that_leave_the_image_are_passed_over() -> None:
     assert LeftImages().add(make_band(3, 4, 4, 10)) is None
+
+
+def test_the_size_of_the_image_comes_with_the_calibration() -> None:
     camera = set_header(tessera.calibration_t())
     camera.camera = make_camera()
-    assert BusScene().on_calibration(received(camera)) == []
+    assert BusScene().image_size is None
+    bus = BusScene()
+    bus.on_calibration(received(camera))
+    assert bus.image_size == (camera.camera.width, camera.camera.height)
+    assert isinstance(by_path(bus.map_shapes())[scene.CAMERA], scene.Camera), "also without a map"

@@ -12,7 +12,7 @@ import pytest
 from helpers.made_run import write_run
 from tessera_cli.errors import RunError, UserError
 from tessera_cli.viewing import viewer_process, window
-from tessera_cli.viewing.scene import INLIERS_PLOT, Look, Moment, Picture, Points, Poses, Series, look_at_path
+from tessera_cli.viewing.scene import INLIERS_PLOT, Look, Moment, Picture, Points, PointSeries, Poses, Series
 from tessera_cli.viewing.view_run import view_run
 from tessera_cli.viewing.viewer_process import LOOPBACK, ViewerProcess
 from tessera_cli.viewing.window import open_view
@@ -64,14 +64,6 @@ def test_a_viewer_that_ends_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: 
         ViewerProcess(None).wait_until_it_listens()
 
 
-def test_the_eye_sees_the_whole_path() -> None:
-    look = look_at_path(np.array([[0.0, 0, 0], [10, 0, 30]]), INLIERS_PLOT)
-    assert look.eye is not None and look.target is not None
-    assert look.target.tolist() == [5, 0, 15]
-    assert look.eye[1] < -20, "from above: y points down"
-    assert look.plots == (INLIERS_PLOT,)
-
-
 def test_a_recording_holds_what_was_shown(tmp_path: Path) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed: procman/tessera view installs it")
     from tessera_cli.viewing.rerun_sink import RerunSink
@@ -80,10 +72,17 @@ def test_a_recording_holds_what_was_shown(tmp_path: Path) -> None:
     numbers = np.arange(3)
     sink.show(Series("keypoints/inliers", numbers, 0.1 * numbers, np.array([1.0, 2.0, 3.0])))
     sink.show(Poses("world/camera", numbers, 0.1 * numbers, np.zeros((3, 3)), np.tile([0, 0, 0, 1.0], (3, 1))))
+    corners = [np.zeros((2, 2)), np.empty((0, 2)), np.ones((1, 2))]
+    sink.show(PointSeries("world/camera/image/new", numbers, 0.1 * numbers, corners, (1, 2, 3), 2.0))
+    sink.show(PointSeries("world/camera/image/lost", np.empty(0, int), np.empty(0), [], (1, 2, 3), 2.0))
     sink.show(Points("world/landmarks", np.zeros((5, 3)), (1, 2, 3), 2.0))
     sink.show(Picture("world/camera/image", b"no image", Moment(2, 0.2)))
+    sink.arrange(Look((INLIERS_PLOT,), image_size=(640, 480)))
     sink.close()
     data = (tmp_path / "made.rrd").read_bytes()
     assert len(data) > 1000
+    assert viewer_process.is_whole(tmp_path / "made.rrd")
+    (tmp_path / "cut.rrd").write_bytes(data[:-100])
+    assert not viewer_process.is_whole(tmp_path / "cut.rrd")
     for path in (b"landmarks", b"inliers", b"camera"):
         assert path in data
