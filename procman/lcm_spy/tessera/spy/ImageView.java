@@ -69,14 +69,12 @@ final class ImageView extends LiveView {
     }
     Frame frame = frames.get(newest);
     if (frame == null) {
-      graphics.setColor(TEXT);
-      graphics.drawString("waiting for images and keypoints", 10, 18);
+      drawWords(graphics, "waiting for images and keypoints");
       return;
     }
     draw(graphics, frame);
-    graphics.setColor(TEXT);
     String without = frame.hasImage() ? "" : " (its image has not come)";
-    graphics.drawString("frame " + newest + ", " + frame.x.length + " keypoints" + without, 10, 18);
+    drawWords(graphics, "frame " + newest + ", " + frame.x.length + " keypoints" + without);
   }
 
   private static int rank(Frame frame) {

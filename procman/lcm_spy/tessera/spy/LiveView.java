@@ -2,6 +2,7 @@ package tessera.spy;
 
 import java.awt.Color;
 import java.awt.Dimension;
+import java.awt.FontMetrics;
 import java.awt.Graphics;
 import java.awt.Graphics2D;
 import java.awt.RenderingHints;
@@ -39,6 +40,15 @@ abstract class LiveView extends JComponent implements LCMSubscriber {
   abstract void receive(String channel, LCMDataInputStream message) throws IOException;
 
   abstract void draw(Graphics2D graphics);
+
+  /** In the top left corner, on a ground of its own: images may be bright there. */
+  final void drawWords(Graphics2D graphics, String words) {
+    FontMetrics font = graphics.getFontMetrics();
+    graphics.setColor(BACKGROUND);
+    graphics.fillRect(0, 0, font.stringWidth(words) + 20, font.getHeight() + 8);
+    graphics.setColor(TEXT);
+    graphics.drawString(words, 10, 18);
+  }
 
   final void listen(LCM bus, String channel) {
     if (!buses.contains(bus)) buses.add(bus);

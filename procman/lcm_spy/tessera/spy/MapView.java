@@ -58,8 +58,7 @@ final class MapView extends LiveView {
     }
     graphics.setColor(BACKGROUND);
     graphics.fillRect(0, height, getWidth(), getHeight() - height);
-    graphics.setColor(TEXT);
-    graphics.drawString(keyframes.size() + " keyframes, " + landmarks.size() + " landmarks heard of", 10, 18);
+    drawWords(graphics, keyframes.size() + " keyframes, " + landmarks.size() + " landmarks heard of");
     int row = height + LINE_PX;
     for (String line : lines) {
       graphics.drawString(line, 10, row);

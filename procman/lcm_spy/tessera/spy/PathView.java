@@ -9,7 +9,7 @@ import lcm.lcm.LCMDataInputStream;
 import tessera.ground_truth_t;
 import tessera.pose_t;
 
-/** The path as it was published, and the true one in its own world, brought to the same start. */
+/** The path as it was published; of a channel of true poses, the true one. */
 final class PathView extends LiveView {
   private static final Color ESTIMATE = new Color(240, 190, 60), TRUTH = new Color(150, 150, 150);
   private static final String[] STATES = {"initializing", "tracked", "lost"};
@@ -39,8 +39,7 @@ final class PathView extends LiveView {
       above.drawLine(graphics, path, estimate.isEmpty() ? TRUTH : ESTIMATE);
       above.drawPoints(graphics, path.subList(path.size() - 1, path.size()), Color.WHITE, 6);
     }
-    graphics.setColor(TEXT);
-    graphics.drawString(words(), 10, 18);
+    drawWords(graphics, words());
   }
 
   private String words() {
