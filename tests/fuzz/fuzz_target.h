@@ -33,6 +33,9 @@ class FuzzInput {
 // What FuzzInput takes as one piece.
 std::string Piece(std::string_view text);
 
+// The inputs of a file of pieces; none if there is no such file.
+std::vector<std::string> ReadCorpus(const std::string& path);
+
 // A folder for the input's files, in memory, removed at the end.
 class FuzzFolder {
  public:

@@ -43,8 +43,8 @@ class Subscriber {
         break;
       case 2: {
         const int64_t first = TakeSequence(input), next = first + TakeSequence(input);
-        channel_.OnHeartbeat(publisher, epoch_us, {.channel = "POSE", .first_sequence = first, .next_sequence = next},
-                             now_us_);
+        const StreamHead head{.channel = "POSE", .epoch_us = epoch_us, .first_sequence = first, .next_sequence = next};
+        channel_.OnHeartbeat(publisher, head, now_us_);
         break;
       }
       default:

@@ -1,9 +1,9 @@
-// The entry points that libFuzzer calls; FAMILY_fuzz --seeds FOLDER writes the target's seeds instead.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "core/errors.h"
 #include "fuzz/fuzz_target.h"
@@ -66,21 +66,12 @@ void Expect(bool condition, const char* what) {
   std::abort();
 }
 
+std::vector<std::string> ReadCorpus(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::vector<std::string> inputs;
+  for (FuzzInput input(text); !input.is_empty();) inputs.emplace_back(input.TakePiece());
+  return inputs;
+}
+
 }  // namespace tessera
-
-extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
-  if (*argc == 3 && std::string((*argv)[1]) == "--seeds") {
-    std::filesystem::create_directories((*argv)[2]);
-    int number = 0;
-    for (const std::string& seed : tessera::Seeds()) {
-      std::ofstream(std::string((*argv)[2]) + "/seed" + std::to_string(number++), std::ios::binary) << seed;
-    }
-    std::exit(number > 0 ? EXIT_SUCCESS : EXIT_FAILURE);
-  }
-  return 0;
-}
-
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  tessera::Read({reinterpret_cast<const char*>(data), size});
-  return 0;
-}
