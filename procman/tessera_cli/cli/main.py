@@ -1,6 +1,5 @@
 """The entry: parses the arguments and runs the command. Exit status 0 done, 1 it failed, 2 the input is wrong."""
 
-import errno
 import os
 import resource
 import sys
@@ -31,6 +30,7 @@ from tessera_cli.cli.commands import (
 )
 from tessera_cli.cli.parsing import Parser
 from tessera_cli.errors import RunError, UserError
+from tessera_cli.files import NO_ROOM
 from tessera_cli.text import visible
 from tessera_cli.versions import tessera_version
 
@@ -78,7 +78,7 @@ def main() -> int:
         _drop_output()  # its reader, such as `head`, has closed it
         return 1
     except OSError as error:
-        if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EFBIG):
+        if error.filename is None and error.errno in NO_ROOM:
             _drop_output()
             place = "the output of this command can't be written"
         else:

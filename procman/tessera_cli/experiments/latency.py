@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from tessera_cli.console import say
-from tessera_cli.errors import UserError
 from tessera_cli.experiments.checkouts import this_checkout
 from tessera_cli.experiments.commands import CommandRunner
-from tessera_cli.experiments.plan import Sequence, choose_sequences
+from tessera_cli.experiments.plan import Sequence, sequences_of
+from tessera_cli.experiments.runner import RunOptions
 from tessera_cli.experiments.targets import STANDARD
-from tessera_cli.files import absolute, write_text
+from tessera_cli.files import write_text
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.runs.run_folder import new_folder
 
@@ -50,11 +50,7 @@ class Condition:
 
 def measure_latency(arguments: Namespace) -> int:
     """`tessera experiment latency`."""
-    sequences, absent = choose_sequences(arguments.sources, STANDARD[:NUM_SEQUENCES], absolute(arguments.data))
-    for sentence in absent:
-        say(sentence)
-    if not sequences:
-        raise UserError("no sequence is left to be measured.")
+    sequences = sequences_of(arguments, STANDARD[:NUM_SEQUENCES])
     folder = new_folder("experiment-latency")
     folder.mkdir(parents=True, exist_ok=True)
     grid = itertools.product(sequences, (False, True), RATES, EXTRACTORS_AND_TILES)
@@ -87,12 +83,9 @@ def _load(is_busy: bool) -> Iterator[None]:
 
 
 def _run(condition: Condition, arguments: Namespace, commands: CommandRunner, folder: Path) -> None:
-    first, last = arguments.frames
-    words = ["run", condition.sequence.source, "--sensor", condition.sequence.sensor]
-    words += ["--live", "--pace", str(condition.rate), "--frames", f"{first}:{last if last >= 0 else ''}"]
-    words += ["--extractors", str(condition.extractors), "--tiles", condition.tiles]
-    words += ["--port", str(arguments.port), "--out", str(folder)]
-    here = this_checkout()
+    here, options = this_checkout(), RunOptions(condition.extractors, arguments.frames, arguments.port)
+    words = options.words(condition.sequence, condition.sequence.source, folder)
+    words += ["--live", "--pace", str(condition.rate), "--tiles", condition.tiles]
     commands.run(condition.name, [*here.words, *words], here.folder, here.environment, lambda _: None)
 
 

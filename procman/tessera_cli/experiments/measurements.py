@@ -45,7 +45,7 @@ def measure(summary: Summary) -> Measurement:
     return Measurement(
         frames=frames,
         frames_per_s=summary["frames_per_s"],
-        cpu_ms=_by_kind({name: 1000.0 * cpu_s / frames for name, cpu_s in summary["cpu_s"].items()}),
+        cpu_ms=_by_kind(cpu_ms_of(summary)),
         busy_ms={name: step["count"] * step["mean"] / frames for name, step in steps.items() if "count" in step},
         keyframes=summary["keyframes"],
         error_m=summary.get("rms_error_m"),
@@ -54,6 +54,11 @@ def measure(summary: Summary) -> Measurement:
         map_wait_ms=wait.get("mean"),
         hashes=(summary.get("trajectory_sha256") or "", summary.get("map_sha256") or ""),
     )
+
+
+def cpu_ms_of(summary: Summary) -> dict[str, float]:
+    """CPU time of a frame, by process."""
+    return {name: 1000.0 * cpu_s / summary["frames"] for name, cpu_s in summary["cpu_s"].items()}
 
 
 def _by_kind(by_process: dict[str, float]) -> dict[str, float]:

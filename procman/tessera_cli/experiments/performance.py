@@ -6,8 +6,6 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from tessera_cli.console import say
-from tessera_cli.errors import UserError
 from tessera_cli.experiments.checkouts import Checkout, other_checkout, this_checkout
 from tessera_cli.experiments.commands import CommandRunner
 from tessera_cli.experiments.comparison_page import headline, write_comparison_page
@@ -22,8 +20,8 @@ from tessera_cli.experiments.plan import (
     Sequence,
     alternate,
     check_out,
-    choose_sequences,
     open_folder,
+    sequences_of,
 )
 from tessera_cli.experiments.progress_view import ProgressView
 from tessera_cli.experiments.runner import EVENTS, ExperimentRunner, RunOptions
@@ -31,7 +29,7 @@ from tessera_cli.experiments.series import disturbances
 from tessera_cli.experiments.tables import Comparison, as_csv, as_json, print_table
 from tessera_cli.experiments.targets import STANDARD
 from tessera_cli.experiments.timeline import reconstruct
-from tessera_cli.files import absolute, write_text
+from tessera_cli.files import write_text
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.report.drawing import Drawing
 from tessera_cli.runs.run_folder import read_settings
@@ -42,11 +40,7 @@ WHOLE = (0, -1)
 
 def measure_performance(arguments: Namespace) -> int:
     """`tessera experiment performance`."""
-    sequences, absent = choose_sequences(arguments.sources, STANDARD, absolute(arguments.data))
-    for sentence in absent:
-        say(sentence)
-    if not sequences:
-        raise UserError("no sequence is left to be measured.")
+    sequences = sequences_of(arguments, STANDARD)
     check_out(arguments.out, arguments.force)
     interrupt = Interrupt()
     with ProgressView() as view:

@@ -7,10 +7,12 @@ first repetition of all sequences before the second.
 import json
 import re
 import shutil
+from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.files import absolute, write_text
 from tessera_cli.runs.run_folder import Summary, new_folder
@@ -71,8 +73,8 @@ def choose_sequences(
 ) -> tuple[list[Sequence], list[str]]:
     """Those of --source (sensor, source), else the standard ones that are there, and a sentence for each that isn't.
 
-    `standard`: their folders are relative to `data`. Raises UserError for a source that is malformed or missing, for
-    two of one name, and if nothing is left.
+    `standard`: their folders are relative to `data`. Raises UserError for a source that is malformed or missing, and
+    for two of one name.
     """
     absent = []
     chosen = [_own_sequence(sensor, text) for sensor, text in specs]
@@ -89,6 +91,16 @@ def choose_sequences(
     if len(set(keys)) < len(keys):
         raise UserError("--source: a sequence is given twice with the same sensor.")
     return chosen, absent
+
+
+def sequences_of(arguments: Namespace, standard: list[Sequence]) -> list[Sequence]:
+    """What --source and --data choose. Those that are left out are told; raises UserError if nothing is left."""
+    sequences, absent = choose_sequences(arguments.sources, standard, absolute(arguments.data))
+    for sentence in absent:
+        say(sentence)
+    if not sequences:
+        raise UserError("no sequence is left to be measured.")
+    return sequences
 
 
 def _own_sequence(sensor: str, text: str) -> Sequence:

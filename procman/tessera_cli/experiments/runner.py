@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tessera_cli.errors import RunError
@@ -26,6 +26,14 @@ class RunOptions:
     extractors: int
     frames: tuple[int, int]  # last exclusive; -1: to the end
     port: int
+
+    def words(self, sequence: Sequence, source: str, path: Path) -> list[str]:
+        """The command, without the program; the run's folder is `path`."""
+        words = ["run", source, "--sensor", sequence.sensor, "--extractors", str(self.extractors)]
+        words += ["--port", str(self.port), "--out", str(path)]
+        if self.frames != (0, -1):
+            words += ["--frames", f"{self.frames[0]}:{self.frames[1] if self.frames[1] >= 0 else ''}"]
+        return words
 
 
 class ExperimentRunner:
@@ -52,7 +60,7 @@ class ExperimentRunner:
 
         def carry_out(run: PlannedRun) -> float:
             path, source = self._folder.run_path(run), sources[run.sequence.key]
-            return self._run(self._sides[run.side], run.name, run.sequence, source, path, self._options.frames, [])
+            return self._run(self._sides[run.side], run.name, path, self._options.words(run.sequence, source, path))
 
         measure_all(self._folder, runs, carry_out, self._view)
 
@@ -69,7 +77,8 @@ class ExperimentRunner:
             last = min(last, first + RECORDED_FRAMES) if last >= 0 else first + RECORDED_FRAMES
             name = f"{sequence.key}_{side}"
             try:
-                self._run(self._sides[side], f"record_{name}", sequence, source, path, (first, last), ["--record"])
+                words = [*replace(self._options, frames=(first, last)).words(sequence, source, path), "--record"]
+                self._run(self._sides[side], f"record_{name}", path, words)
                 self._read_log(self._sides[side], f"events_{name}", path)
             except RunError as error:
                 self._view.say(f"{sequence.title}, {side}, has no picture of a frame's way: {error}")
@@ -83,22 +92,9 @@ class ExperimentRunner:
         environment = {**here.environment, "TESSERA_BUILD": str(checkout.build)}
         self._commands.run(name, words, here.folder, environment, self._view.look)
 
-    def _run(
-        self,
-        checkout: Checkout,
-        name: str,
-        sequence: Sequence,
-        source: str,
-        path: Path,
-        frames: tuple[int, int],
-        more: list[str],
-    ) -> float:
+    def _run(self, checkout: Checkout, name: str, path: Path, words: list[str]) -> float:
         """CPU seconds of the whole command. What an interrupted run left in `path` goes."""
         shutil.rmtree(path, ignore_errors=True)
-        words = ["run", source, "--sensor", sequence.sensor, "--extractors", str(self._options.extractors)]
-        words += ["--port", str(self._options.port), "--out", str(path), *more]
-        if frames != (0, -1):
-            words += ["--frames", f"{frames[0]}:{frames[1] if frames[1] >= 0 else ''}"]
         return self._commands.run(
             name, [*checkout.words, *words], checkout.folder, checkout.environment, self._view.look
         )

@@ -70,6 +70,17 @@ examples:
   procman/tessera experiment latency
   procman/tessera experiment latency --source stereo=sim:street-short --frames 0:100
 """
+CORES = """\
+Without --source: the sequences of `performance`. Each runs once on each number of cores that --cores names and this
+machine has. For all of them the table says how many frames a second the work itself allows: all cores together can't
+do more, nor can the process that has most to do. Trajectory and map must be the same.
+
+The folder holds the runs, and the table as cores.csv.
+
+examples:
+  procman/tessera experiment cores
+  procman/tessera experiment cores --source rgbd=tum:DIR --cores 1 2 3 4
+"""
 COMPARE = """\
 examples:
   procman/tessera experiment compare logs/homogeneous logs/heterogeneous --out comparison.html
@@ -101,6 +112,7 @@ def add_parser(commands: Commands) -> None:
     compare.add_argument("second", metavar="B", help="that of another one")
     compare.add_argument("--out", metavar="FILE.html", help="the page, default comparison.html in the working folder")
     _add_latency(experiments)
+    _add_cores(experiments)
     add_command(experiments, "extraction", _extraction, "Time per image, compared with cv::ORB.")
     places = add_command(experiments, "places", _places, "Recall and precision of place recognition.")
     places.add_argument("sources", metavar="SOURCE", nargs="*", help=SOURCES)
@@ -211,6 +223,19 @@ def _add_latency(experiments: Commands) -> None:
     add_port(parser)
 
 
+def _add_cores(experiments: Commands) -> None:
+    summary = "The frame rate against the number of cores, and what bounds it."
+    parser = add_command(experiments, "cores", _cores, summary, CORES)
+    parser.add_argument(
+        "--cores", type=whole_number(1, 1024), metavar="N", nargs="+", default=[1, 2, 4, 8], help="default 1 2 4 8"
+    )
+    _add_sources(parser)
+    add_frames(parser, ", for a quick check")
+    add_extractors(parser, 1)
+    _add_out(parser, "cores")
+    add_port(parser)
+
+
 def _add_sources(parser: Parser) -> None:
     parser.add_argument(
         "--source",
@@ -266,6 +291,12 @@ def _latency(arguments: Namespace) -> int:
     from tessera_cli.experiments.latency import measure_latency
 
     return measure_latency(arguments)
+
+
+def _cores(arguments: Namespace) -> int:
+    from tessera_cli.experiments.cores import measure_cores
+
+    return measure_cores(arguments)
 
 
 def _extraction(_arguments: Namespace) -> int:

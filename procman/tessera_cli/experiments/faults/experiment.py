@@ -51,12 +51,12 @@ UNDISTURBED, DISTURBED = "undisturbed", "disturbed"
 
 def measure_faults(arguments: Namespace) -> int:
     """`tessera experiment faults`."""
-    _require(arguments.kinds)
-    sequence = choose_sequences([arguments.source], [], Path())[0][0]
-    checkout, interrupt = this_checkout(), Interrupt()
     cards = deck(arguments.processes, arguments.kinds, arguments.extractors)
     if not cards:
         raise UserError("--kinds and --processes leave no fault: only extractors are slowed down.")
+    _require(arguments.kinds)
+    sequence = choose_sequences([arguments.source], [], Path())[0][0]
+    checkout, interrupt = this_checkout(), Interrupt()
     description = _describe(arguments, sequence, checkout)
     folder, continues = open_folder(arguments.out, NAME, description, arguments.force)
     with ProgressView() as view, ExitStack() as stack:

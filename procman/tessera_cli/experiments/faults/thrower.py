@@ -23,6 +23,11 @@ SLOW_SHARE = 0.1
 LISTEN_S = 0.01
 # A process that has not been there for so long has ended: its fault is left out.
 MISSING_S = 10.0
+# These continue by their journals, and say then (stage_engine.cc) that they are where they were.
+JOURNALED = ("tracker", "mapper", "loop_closer", "global_adjuster", "evaluator")
+IS_BACK = "continues where it was when it was killed"
+# Poses of so many frames may follow a death that none of them needed: dispatcher.max_frames_in_flight, and some more.
+IN_FLIGHT = 10
 
 
 @dataclass
@@ -33,7 +38,7 @@ class Thrown:
     kind: str
     frame: int  # of the last pose before it
     began_s: float
-    ended_s: float
+    ended_s: float  # of a process that was killed: when it was back where it had been
 
 
 class Thrower:
@@ -54,6 +59,7 @@ class Thrower:
         self._due_s: float | None = None
         self._undo_at: float | None = None
         self._undo: Callable[[], None] = _nothing
+        self._num_back = 0  # times that the process that was killed had come back before
         self._last_frame = -1
         self.pose_times: list[float] = []  # monotonic seconds, of frames that had none before
         self.thrown: list[Thrown] = []
@@ -68,7 +74,7 @@ class Thrower:
         listen([self._bus], LISTEN_S)
         now = time.monotonic()
         if self._undo_at is not None:
-            if now >= self._undo_at:
+            if now >= self._undo_at and self._is_back():
                 self._end(now)
         elif len(self.thrown) < self._most and now < self._until_s and self._is_due(now):
             self._throw(now)
@@ -101,8 +107,19 @@ class Thrower:
         self._undo_at = now + fault.duration_s
         self.thrown.append(Thrown(fault.process, fault.kind, self._last_frame, now, now))
         self._next = None
-        if fault.kind == KILL:
-            self._end(now)
+
+    def _is_back(self) -> bool:
+        """What was killed repeats its steps, or reads its source again: the pauses of that time are of this fault."""
+        fault = self.thrown[-1]
+        if fault.kind != KILL:
+            return True
+        if fault.process in JOURNALED:
+            return self._count_back(fault.process) > self._num_back
+        return self._last_frame >= fault.frame + IN_FLIGHT
+
+    def _count_back(self, process: str) -> int:
+        log = self._folder / "stages" / f"{process}.log"
+        return log.read_text(errors="replace").count(IS_BACK) if log.is_file() else 0
 
     def _make(self, fault: Fault, pids: list[int]) -> Callable[[], None]:
         """Returns what ends the fault."""
@@ -116,6 +133,7 @@ class Thrower:
             for pid in pids:
                 groups.join(0, pid)
             return lambda: groups.set_share(1.0)
+        self._num_back = self._count_back(fault.process)
         _send(pids, {KILL: signal.SIGKILL, STOP: signal.SIGSTOP}[fault.kind])
         return (lambda: _send(pids, signal.SIGCONT)) if fault.kind == STOP else _nothing
 
