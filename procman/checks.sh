@@ -46,7 +46,7 @@ run_sanitized() {
   configure "$folder" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DTESSERA_SANITIZE="$1" \
     -DTESSERA_DATA="$root/$folder/no-data"
   # shellcheck disable=SC2046 # one word for each
-  build_in "$folder" $(sanitized_tests)
+  build_in "$folder" $(sanitized_tests) tessera_fuzz_targets
   finish_setup
   export ASAN_OPTIONS=detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=second_deadlock_stack=1
   # The unit tests: rendered worlds and whole pipelines take many minutes there (ctest --test-dir FOLDER runs them too).
@@ -58,7 +58,8 @@ run_sanitized() {
 fuzz_families() { sed -nE 's/^tessera_fuzz\(([a-z_]+).*/\1/p' "$root/tests/fuzz/CMakeLists.txt"; }
 
 # run_fuzz SECONDS: the fuzz targets, in a build of their own by Clang under sanitizers, one after the other, each for its
-# share of the time. What libFuzzer finds worth keeping stays in build-fuzz/corpus: the next time goes on from there.
+# share of the time. What libFuzzer finds worth keeping stays in build-fuzz/corpus: the next time continues from there.
+# (libfuzzer_main.cc says how it gets into tests/fuzz/corpus.)
 run_fuzz() {
   local family families=()
   mapfile -t families < <(fuzz_families)
@@ -77,7 +78,7 @@ run_fuzz() {
 # run_fuzz_target FAMILY SECONDS: the last lines of its output, and all of it if it failed.
 run_fuzz_target() {
   local folder="$root/build-fuzz/corpus/$1" target="$root/build-fuzz/tests/fuzz/$1_fuzz" log="$root/build-fuzz/$1.log"
-  "$target" --seeds "$folder"
+  "$target" --unpack "$root/tests/fuzz/corpus/$1" "$folder"
   if UBSAN_OPTIONS=print_stacktrace=1 "$target" -max_total_time="$2" -max_len=8192 -rss_limit_mb=2048 -timeout=20 \
     -print_final_stats=1 -artifact_prefix="$root/build-fuzz/$1-" "$folder" >"$log" 2>&1; then
     sed -n 's/^stat::number_of_executed_units: */tessera: inputs: /p' "$log" >&2

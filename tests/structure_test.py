@@ -28,7 +28,6 @@ COVERED_BY_OTHERS = {
     "runtime/incoming_streams.h": "inside of memory_bus_test",
     "runtime/map_subscription.h": "mapping_pipeline_test and revival_test follow the map by it",
     "runtime/outgoing_streams.h": "inside of memory_bus_test",
-    "runtime/stream_settings.h": "memory_bus_test sets them",
     "runtime/value_receiver.h": "inside of memory_bus_test",
     "settings/sections.h": "default_settings_test reads every section",
     "simulation/texture.h": "inside of renderer_test",

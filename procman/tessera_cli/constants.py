@@ -16,6 +16,8 @@ LAN_MESSAGE_BYTES = 1400
 RECEIVE_BUFFER_BYTES = 4194304
 # Messages that LCM keeps for a subscriber. Poses come in bursts, and LCM's default of 30 would drop some.
 QUEUE_CAPACITY = 1000
+# On a LAN, where a change of the map is some hundred messages.
+LAN_QUEUE_CAPACITY = 20_000
 # Messages handled before a loop looks at its processes again.
 MAX_MESSAGES_PER_TURN = 200
 
@@ -61,7 +63,7 @@ EXPERIMENT_POLL_S = 0.1
 RUN_PANEL_PERIOD_S = 0.25
 WATCH_PANEL_PERIOD_S = 0.5
 # The mapper may be in the middle of a bundle adjustment: asking for the map more often helps nobody.
-MAP_ASK_S = 0.3
+MAP_ASK_S = 1.0
 # Between two lines where there is no terminal.
 LINE_PERIOD_S = 5.0
 # The frame rate shown is that of the last poses only, so that it follows changes.

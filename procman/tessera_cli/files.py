@@ -1,6 +1,8 @@
 """The folders of this checkout, its Python, and files that are written whole or not at all."""
 
+import errno
 import os
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +13,8 @@ PROCMAN = ROOT / "procman"
 # TESSERA_BUILD: another build of the same sources, for developers.
 BUILD = Path(os.environ.get("TESSERA_BUILD", ROOT / "build"))
 BIN = BUILD / "bin"
+# What writing fails with where the disk is full, over its quota, or broken.
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def python_command(module: str) -> list[str]:
@@ -33,8 +37,28 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         yield written
         os.replace(written, path)
+    except OSError as error:
+        # Writing does not tell which file it was; opening does.
+        if error.filename is None and error.errno in NO_ROOM:
+            error.filename = str(path)
+        raise
     finally:
         written.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """Yields a new folder to write into, which becomes `path` at the end. Nothing is left if writing fails."""
+    written = unfinished(path)
+    shutil.rmtree(written, ignore_errors=True)
+    written.mkdir()
+    try:
+        yield written
+        if path.exists():
+            shutil.rmtree(path)
+        os.replace(written, path)
+    finally:
+        shutil.rmtree(written, ignore_errors=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -13,6 +13,7 @@ import lcm
 
 from tessera_cli.constants import (
     LAN_GROUPS,
+    LAN_QUEUE_CAPACITY,
     MAX_MESSAGES_PER_TURN,
     MULTICAST_GROUP,
     PORT_OFFSETS,
@@ -35,9 +36,9 @@ def bus_url(port: int, time_to_live: int = 0, group: str = MULTICAST_GROUP) -> s
 
 
 def stack_bus_url(bus: str, port: int, on_lan: bool) -> str:
-    """Of a bus of PORT_OFFSETS. `port`: the base port of all. On one machine the map's bus is the main one."""
+    """Of a bus of PORT_OFFSETS. `port`: the base port of all."""
     if not on_lan:
-        return bus_url(port + PORT_OFFSETS["main" if bus == "map" else bus])
+        return bus_url(port + PORT_OFFSETS[bus])
     return bus_url(port + PORT_OFFSETS[bus], 1, LAN_GROUPS.get(bus, MULTICAST_GROUP))
 
 
@@ -105,7 +106,7 @@ class Bus:
         subscription = self._lcm.subscribe(pattern, handler)
         if subscription is None:
             raise RunError(_explain(self.url, "nothing can be received"))
-        subscription.set_queue_capacity(QUEUE_CAPACITY)
+        subscription.set_queue_capacity(QUEUE_CAPACITY if self.url.endswith("?ttl=0") else LAN_QUEUE_CAPACITY)
         return subscription
 
     def unsubscribe(self, subscription: Any) -> None:

@@ -26,6 +26,11 @@ TAG_OFFSET, HEADER_BYTES = 8, 128
 
 # What an order says for bus.run_dir: each deputy puts a folder of its own in its place.
 LOCAL_RUN_DIR = "local"
+# Where this user has no secret of a run.
+MEMBERS_ONLY = (
+    "the stack on this bus answers its own members only: give this command where it was started, as its user "
+    "(--port and --prefix as there)."
+)
 
 
 def draw_secret() -> bytes:

@@ -25,11 +25,10 @@ Settings = dict[str, dict[str, Any]]  # sections of keys
 
 def network_assignments(port: int, on_lan: bool) -> list[str]:
     """The buses of a stack with this base port; `on_lan`: their messages leave this machine."""
-    assignments = [f"bus.{bus}_url={stack_bus_url(bus, port, on_lan)}" for bus in ("main", "camera", "work")]
+    assignments = [f"bus.{bus}_url={stack_bus_url(bus, port, on_lan)}" for bus in ("main", "camera", "work", "map")]
     assignments.append(f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}")
     if on_lan:
         tile_url = f"udpm://{LAN_TILE_GROUP}:{{port}}?ttl=1"
-        assignments.append("bus.map_url=" + stack_bus_url("map", port, on_lan))
         assignments += [f"bus.tile_url={tile_url}", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
         assignments.append("dispatcher.pack_tiles=true")
     return assignments

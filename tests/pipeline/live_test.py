@@ -1,6 +1,7 @@
 """Live runs: what is dropped and when it is told, cameras that fall silent and come back, and what a run never does."""
 
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -8,10 +9,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import lcm
 import pytest
 from PIL import Image
 
-from helpers.stack import NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera, read_line, wait_for
+from helpers.stack import NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera, pids_of, read_line, wait_for
 from helpers.synthetic_sequence import CENTER_PX, FOCAL_PX, HEIGHT_PX, WIDTH_PX
 
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -20,7 +22,7 @@ BINDINGS = "import gi; gi.require_version('GstRtspServer', '1.0'); from gi.repos
 
 def test_a_live_run_is_replayed_as_it_went(tessera: Tessera, sequence: Path) -> None:
     """Nobody waits for the mapper, and frames drop: what came of that depends on the machine, but can be repeated."""
-    live = tessera.run(f"kitti:{sequence}", "--live", "--record", "--pace", "40", "--extractors", 1).must_end_well()
+    live = run_with_a_pause(tessera, sequence, "--live", "--record").must_end_well()
     assert live.summary["frames_dropped"] > 0
     assert any(text.startswith(f"Dropped {live.summary['frames_dropped']} of") for text in live.summary["warnings"])
     replayed = tessera.run(
@@ -32,6 +34,22 @@ def test_a_live_run_is_replayed_as_it_went(tessera: Tessera, sequence: Path) -> 
         assert replayed.summary[key] == live.summary[key], key
     assert (replayed.folder / "trajectory_live.txt").read_text() == (live.folder / "trajectory_live.txt").read_text()
     tessera.run(live.folder / "run.lcmlog", "--live", command="replay").must_refuse("leave out --live")
+
+
+def run_with_a_pause(tessera: Tessera, sequence: Path, *options: object) -> Finished:
+    """Its only extractor stands still for a moment, so that frames drop however fast the machine is."""
+    port, folder = tessera.next_port(), tessera.next_folder()
+    run = tessera.start("run", f"kitti:{sequence}", *options, "--extractors", 1, "--port", port, "--out", folder)
+    poses = []
+    bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
+    bus.subscribe("POSE", lambda _channel, data: poses.append(data)).set_queue_capacity(1000)
+    wait_for(lambda: (bus.handle_timeout(20), len(poses) > NUM_FRAMES // 3)[1], "poses")
+    [extractor] = pids_of(folder, "extractor")
+    os.kill(extractor, signal.SIGSTOP)
+    time.sleep(0.5)
+    os.kill(extractor, signal.SIGCONT)
+    out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    return Finished(run.returncode, out, "", folder)
 
 
 def test_a_file_is_read_at_its_own_pace(tessera: Tessera, sequence: Path) -> None:
@@ -51,6 +69,26 @@ def test_a_run_that_located_nothing_says_so(tessera: Tessera, sequence: Path, re
     assert finished.status == 1, finished.out + finished.err
     assert "no pose was found for any of 12 frames" in finished.err
     assert "Tracking never failed" not in finished.out
+
+
+def test_what_was_tracked_before_a_damaged_image_is_kept(tessera: Tessera, sequence: Path, tmp_path: Path) -> None:
+    damaged = Path(shutil.copytree(sequence, tmp_path / "damaged"))
+    image = damaged / "image_0" / f"{NUM_FRAMES - 10:06d}.pgm"
+    image.write_bytes(image.read_bytes()[:200])
+    finished = tessera.run(f"kitti:{damaged}")
+    assert finished.status == 2, finished.out + finished.err
+    assert f"{image} can't be decoded" in finished.err
+    assert finished.summary["frames_tracked"] > 0
+    assert f"what was reached, {finished.summary['frames_tracked']} tracked frames, is in" in finished.out
+    assert "can't be decoded" in finished.summary["ended"]
+
+
+def test_a_folder_in_which_a_run_reached_nothing_is_used_again(
+    tessera: Tessera, sequence: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "settings.yaml").write_text("of a run that was interrupted before its first pose")
+    words = (f"kitti:{sequence}", "--frames", "0:10", "--port", tessera.next_port(), "--out", tmp_path)
+    tessera.command("run", *words).must_end_well()
 
 
 def test_a_run_is_not_overwritten(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
@@ -170,6 +208,37 @@ def test_a_camera_that_stalls_and_dies_is_waited_for(tessera: Tessera, server: R
     replayed = tessera.run(out / "run.lcmlog", command="replay").must_end_well()
     for key in ("trajectory_sha256", "map_sha256"):
         assert replayed.summary[key] == summary[key], key
+
+
+def test_a_v4l2_camera_that_is_unplugged_and_plugged_in_again_is_continued(tessera: Tessera, tmp_path: Path) -> None:
+    """OpenCV's V4L2 code and all of ours, over a device that is made up below it (fake_v4l2.c)."""
+    library, unplugged = tmp_path / "fake_v4l2.so", tmp_path / "unplugged"
+    source = ROOT / "tests" / "helpers" / "fake_v4l2.c"
+    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, source, "-ldl"], check=True)
+    camera = tmp_path / "camera.yaml"
+    camera.write_text("fx_px: 500\nfy_px: 500\ncx_px: 320\ncy_px: 240\n")
+    port, out = tessera.next_port(), tmp_path / "run"
+    words = ("--camera", camera, "--port", port, "--out", out, "--give-up", "10", "--extractors", 1)
+    faked = {"LD_PRELOAD": str(library), "FAKE_V4L2_UNPLUGGED": str(unplugged)}
+    run = tessera.start("run", "camera:0", *words, **faked)
+    until_told(run, " tracked, ")
+    unplugged.touch()
+    until_told(run, "camera silent for")
+    unplugged.unlink()
+    until_told(run, " tracked, ")
+    unplugged.touch()
+    told, _ = run.communicate(timeout=RUN_TIMEOUT_S)
+    summary = json.loads((out / "summary.json").read_text())
+    assert run.returncode == 1, told
+    assert "sent no image for 10 s" in summary["ended"]
+    for event in (
+        "the connection to the camera broke off",
+        "images come again, after",
+        "the camera is connected again",
+    ):
+        assert any(event in warning for warning in summary["warnings"]), summary["warnings"]
+    rows = [line.split() for line in (out / "trajectory.txt").read_text().splitlines() if line[0] != "#"]
+    assert abs(float(rows[-1][0]) - time.time()) < 120, "frames carry the clock of the host, not that of the buffers"
 
 
 def until_told(run: "subprocess.Popen[str]", words: str) -> None:

@@ -93,7 +93,8 @@ def test_a_saved_map_is_continued_and_again_the_same_each_time(
         ).must_end_well()
         for number in (1, 3)
     ]
-    assert continued[0].summary["keyframes"] > run.summary["keyframes"]
+    # The same way again: nothing is new.
+    assert run.summary["keyframes"] <= continued[0].summary["keyframes"] < 1.5 * run.summary["keyframes"]
     assert continued[0].summary["frames_tracked"] == NUM_FRAMES
     for key in ("trajectory_sha256", "map_sha256", "occupancy_sha256"):
         assert continued[0].summary[key] == continued[1].summary[key] is not None

@@ -178,9 +178,9 @@ def test_a_stage_that_is_killed_changes_nothing(
 class KilledRun:
     """A run whose stages are killed when it has so many poses. Nobody keeps more than its last messages in memory."""
 
-    def __init__(self, tessera: Tessera, sequence: Path, *options: object) -> None:
+    def __init__(self, tessera: Tessera, sequence: Path, *options: object, history_bytes: int = 2_000_000) -> None:
         port, self.folder = tessera.next_port(), tessera.next_folder()
-        small = ("--set", "stream.history_bytes=2000000", "--extractors", 1)
+        small = ("--set", f"stream.history_bytes={history_bytes}", "--extractors", 1)
         self._run = tessera.start("run", f"kitti:{sequence}", *small, *options, "--port", port, "--out", self.folder)
         self._frames: set[int] = set()
         self._bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
@@ -221,6 +221,24 @@ def test_stages_that_are_killed_one_after_the_other_change_nothing(
     for key in ("ended", "frames", "frames_tracked", "frames_dropped", "trajectory_sha256", "map_sha256"):
         assert summary[key] == reference_run.summary[key], key
     assert not (run.folder / "journal").exists()
+
+
+def test_a_recorder_that_is_killed_continues_its_log(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
+    """Also right after it was started again, and at the end."""
+    run = KilledRun(tessera, sequence, "--record", "--pace", 0.5, history_bytes=64_000_000)
+    kills = (0, 10, 12, NUM_FRAMES - 5)
+    for num_poses in kills:
+        run.kill("recorder", num_poses)
+    status, out = run.end()
+    assert status == 0, out
+    summary = json.loads((run.folder / "summary.json").read_text())
+    assert [text for text in summary["warnings"] if "recorder was killed by SIGKILL" in text] == summary["warnings"]
+    assert len(summary["warnings"]) == len(kills) and summary["messages_lost"] == 0, out
+    assert not list(run.folder.glob("*.part*"))
+    gaps = tessera.command("log", "gaps", run.folder / "run.lcmlog").out.splitlines()
+    assert "messages are missing in" in gaps[-1]
+    assert not [line for line in gaps[:-1] if not line.startswith(("STATUS ", "EXTRACTOR_READY "))], gaps
+    must_equal(tessera.run(run.folder / "run.lcmlog", "--extractors", 2, command="replay"), reference_run)
 
 
 @pytest.mark.parametrize(
@@ -424,7 +442,7 @@ def publish_noise(port: int, generator: random.Random) -> None:
         "TILE_1",
         "UNKNOWN",
     )
-    buses = [lcm.LCM(f"udpm://239.255.76.67:{port + offset}?ttl=0") for offset in (0, 1, 2, 13, 14)]
+    buses = [lcm.LCM(f"udpm://239.255.76.67:{port + offset}?ttl=0") for offset in (0, 1, 2, 4, 13, 14)]
     raw = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for _ in range(100):
         for bus in buses:

@@ -29,7 +29,15 @@ from tessera_cli.runs.ports import PortLock, take_free_port
 from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, remove_journals, require_no_run
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
-from tessera_cli.runs.summary import Present, ProcessFacts, RunFacts, is_trustworthy, occupancy_warnings, write_summary
+from tessera_cli.runs.summary import (
+    Present,
+    ProcessFacts,
+    RunFacts,
+    is_trustworthy,
+    occupancy_warnings,
+    recording_warnings,
+    write_summary,
+)
 from tessera_cli.settings import Settings, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import Process, read_process_list
@@ -55,9 +63,13 @@ def run_stack(arguments: Namespace, present: Present) -> int:
     try:
         launcher = _make_launcher(arguments, source, folder, present, cleanup)
         return launcher.run()
-    except UserError:
+    except (UserError, KeyboardInterrupt):
         # Arguments or input were at fault from the beginning: the sentence says all, and nothing is to be kept.
         if is_new and (launcher is None or not launcher.has_poses):
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    except RunError:
+        if is_new and launcher is None:  # no process was started whose log would tell more
             shutil.rmtree(folder, ignore_errors=True)
         raise
     finally:
@@ -101,8 +113,8 @@ def _make_launcher(
 
 
 def _without_journal(process: Process, values: Settings) -> Process:
-    """A tracker that keeps no journal can't continue, and nobody can replace it."""
-    if process.command != "tracker" or values["stream"]["journal_dir"]:
+    """These can't continue without one, and nobody can replace them."""
+    if process.command not in ("tracker", "recorder") or values["stream"]["journal_dir"]:
         return process
     return replace(process, options=replace(process.options, auto_respawn="never"))
 
@@ -172,9 +184,10 @@ class Launcher:
                 began = time.monotonic()
                 ended = self._watch(view)
                 self._stop()
-        except RunError as failure:
+        except (RunError, UserError) as failure:
             self._stop()
-            self._try_to_summarize(self._wall_s(began), str(failure))
+            if isinstance(failure, RunError) or self.has_poses:
+                self._try_to_summarize(self._wall_s(began), str(failure))
             raise
         finally:
             self._deputy.kill()
@@ -227,7 +240,7 @@ class Launcher:
         """Until the files of the run are written. Returns how the run ended, as `RunFacts.ended` has it."""
         progress = self._monitor.progress
         is_told = False
-        while not progress.is_finished:
+        while not progress.is_finished or "recorder" in self._deputy.not_ready:
             self._look(view)
             if progress.is_evaluated and "occupancy" in progress.stages and not is_told:
                 view.say("all frames are done; the occupancy map is being completed")
@@ -298,7 +311,8 @@ class Launcher:
             warnings=self._deputy.warnings
             + self._silence.warnings
             + self._missing_frames()
-            + occupancy_warnings(self._monitor.progress.stages.get("occupancy")),
+            + occupancy_warnings(self._monitor.progress.stages.get("occupancy"))
+            + recording_warnings(self._monitor.progress.stages.get("recorder")),
         )
         return write_summary(self._folder, run_facts, process_facts)
 
@@ -317,6 +331,9 @@ class Launcher:
     def _try_to_summarize(self, wall_s: float, sentence: str) -> None:
         """After a failure: of what there is, if there is anything."""
         try:
-            self._present(self._summarize(wall_s, sentence), self._folder)
+            result = self._summarize(wall_s, sentence)
+            self._present(result, self._folder)
         except RunError:
-            pass
+            return
+        if num_tracked := result.summary["frames_tracked"]:
+            say(f"what was reached, {num_tracked} tracked frames, is in {self._folder}")

@@ -84,7 +84,7 @@ class RunLines(_Context):
         self._last = time.monotonic()
         time_left = f"{format_duration(progress.time_left_s)} left, " if progress.num_frames else ""
         say(
-            f"frame {progress.num_poses}{progress.of_all_frames}, {progress.frames_per_s:.1f}/s, "
+            f"frame {progress.num_done}{progress.of_all_frames}, {progress.frames_per_s:.1f}/s, "
             f"{time_left}{progress.state}, latency {progress.latency_text}, "
             f"{progress.num_keyframes} keyframes, {progress.num_landmarks} landmarks, {progress.num_loops} loops, "
             f"dropped {progress.dropped_text}"
@@ -170,8 +170,8 @@ def _draw_bar(progress: Progress) -> Table:
     of_all = f"/{progress.num_frames}" if progress.num_frames else ""
     time_left = f"  {format_duration(progress.time_left_s)} left" if progress.num_frames else ""
     row.add_row(
-        ProgressBar(total=progress.num_frames or None, completed=progress.num_poses, pulse=not progress.num_frames),
-        f"{progress.num_poses}{of_all} frames  {progress.frames_per_s:5.1f}/s{time_left}",
+        ProgressBar(total=progress.num_frames or None, completed=progress.num_done, pulse=not progress.num_frames),
+        f"{progress.num_done}{of_all} frames  {progress.frames_per_s:5.1f}/s{time_left}",
     )
     return row
 

@@ -13,7 +13,7 @@ from tessera_cli.errors import RunError, UserError
 from tessera_cli.files import absolute
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.lcm_bus import bus_url, is_on_lan
-from tessera_cli.membership import RunDir, run_dir_of, secret_of
+from tessera_cli.membership import MEMBERS_ONLY, RunDir, run_dir_of, secret_of
 from tessera_cli.settings import Settings, network_assignments, write_settings
 from tessera_cli.supervision.private_deputy import PrivateDeputy, single_process
 from tessera_cli.supervision.progress import FINISHED
@@ -52,9 +52,7 @@ def _require_stack(main_url: str, channel_prefix: str, run_dir: RunDir) -> None:
             "(and --lan if it is on other machines)."
         )
     if all(any(tag) for tag in tags) and run_dir.secret() is None:
-        raise UserError(
-            "the stack on this bus answers its own members only: give this command where it was started, as its user."
-        )
+        raise UserError(MEMBERS_ONLY)
 
 
 def _write_map(values: Settings, folder: Path) -> None:

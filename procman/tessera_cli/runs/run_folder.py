@@ -25,6 +25,7 @@ from tessera_cli.settings import Settings
 from tessera_cli.text import visible, visible_values
 
 TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d")
+SETTINGS_FILE = "settings.yaml"
 # What a run leaves; files of an earlier run in the same folder must not be taken for its own.
 RUN_FILES = (
     "summary.json",
@@ -46,7 +47,7 @@ RUN_FILES = (
     "occupancy.yaml",
     "run.lcmlog",
     "run.lcmlog.checksums",
-    "settings.yaml",
+    SETTINGS_FILE,
 )
 LOOP_COLUMNS = ("keyframe_timestamp_s", "matched_timestamp_s", "inliers", "scale")
 # How the sentences of source_watch.cc, live_source.cc and dispatcher_session.cc can be known.
@@ -59,6 +60,8 @@ SOURCE_EVENTS = (
 )
 MAX_EVENTS = 50
 OCCUPANCY_GRID = "occupancy.yaml"
+# The one that is there and tells most.
+OCCUPANCY_TREES = ("occupancy.ot", "occupancy.bt")
 # Trajectory files keep microseconds.
 SAME_TIME_S = 1e-4
 
@@ -76,8 +79,8 @@ def choose_folder(out: str | None, source: Source) -> Path:
 
 
 def require_no_run(folder: Path) -> None:
-    """Raises UserError if the folder holds an earlier run, which would be overwritten."""
-    if any((folder / name).exists() for name in RUN_FILES):
+    """Raises UserError if the folder holds an earlier run, which would be overwritten. Settings alone are none."""
+    if any((folder / name).exists() for name in RUN_FILES if name != SETTINGS_FILE):
         raise UserError(f"--out {folder}: it holds a run already; name another folder, or add --force to replace it.")
 
 
@@ -142,6 +145,7 @@ class Result:
     settings: Settings = field(default_factory=dict)
     log_warnings: list[str] = field(default_factory=list)
     grid: Grid | None = None  # of the occupancy stage, in the estimate's world
+    voxel_tree: Path | None = None  # its file of voxels
 
     @property
     def unit(self) -> str:
@@ -192,6 +196,7 @@ def read_run(folder: Path, truth_path: Path | None = None, alignment: str | None
         settings=read_settings(folder / "settings.yaml"),
         log_warnings=read_log_warnings(folder / "stages"),
         grid=read_grid(folder / OCCUPANCY_GRID) if (folder / OCCUPANCY_GRID).is_file() else None,
+        voxel_tree=next((folder / name for name in OCCUPANCY_TREES if (folder / name).is_file()), None),
     )
 
 

@@ -197,6 +197,16 @@ def occupancy_warnings(report: StageReport | None) -> list[str]:
     return [f"The images of {num_missing} keyframes did not reach the occupancy stage: its map lacks what they saw."]
 
 
+def recording_warnings(report: StageReport | None) -> list[str]:
+    """What the recording lacks; `report`: the last one of the recorder, if there was one."""
+    if report is None or report.lost == 0:
+        return []
+    return [
+        f"The recording lacks {report.lost} messages, which came faster than they could be written: it can't repeat "
+        "the run exactly. procman/tessera log gaps run.lcmlog tells where; a slower --pace or a faster disk helps."
+    ]
+
+
 def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
     """A sentence for each stretch of frames after which the map may lie on another scale, in their order.
 

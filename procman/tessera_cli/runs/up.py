@@ -8,6 +8,7 @@ from typing import Any
 
 from tessera_cli.cluster.keys import key_folder
 from tessera_cli.console import say
+from tessera_cli.constants import LAN_MESSAGE_BYTES
 from tessera_cli.errors import UserError
 from tessera_cli.files import absolute
 from tessera_cli.lcm_bus import is_on_lan
@@ -61,11 +62,20 @@ def _name(arguments: Namespace) -> str:
 
 def _assignments(process_list: ProcessList, arguments: Namespace) -> list[str]:
     """All settings of the run that differ from the defaults."""
-    assignments = network_assignments(arguments.port, is_on_lan(arguments)) + process_list.settings
+    on_lan = is_on_lan(arguments)
+    assignments = network_assignments(arguments.port, on_lan)
+    if on_lan and has_map_on_several_hosts(process_list):
+        assignments.append(f"bus.max_local_message_bytes={LAN_MESSAGE_BYTES}")
+    assignments += process_list.settings
     assignments.append(f"bus.run_dir={LOCAL_RUN_DIR}")
     if arguments.out:
         assignments.append(f"evaluator.out_dir={absolute(arguments.out)}")
     return assignments + arguments.settings
+
+
+def has_map_on_several_hosts(process_list: ProcessList) -> bool:
+    """Whether images, features and the map are exchanged over the network: extractors alone take no part in that."""
+    return len({each.host for each in process_list.processes.values() if each.command != "extractor"}) > 1
 
 
 def _merge(assignments: list[str]) -> Settings:

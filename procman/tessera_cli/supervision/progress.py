@@ -176,7 +176,12 @@ class Progress:
     def time_left_s(self) -> float | None:
         if self.num_frames is None or self.frames_per_s <= 0:
             return None
-        return max(0, self.num_frames - self.num_poses) / self.frames_per_s
+        return max(0, self.num_frames - self.num_done) / self.frames_per_s
+
+    @property
+    def num_done(self) -> int:
+        """Frames with a pose; once the evaluator has all of them, also those whose poses this listener has missed."""
+        return self.num_frames if self.is_evaluated and self.num_frames else self.num_poses
 
     @property
     def of_all_frames(self) -> str:

@@ -45,7 +45,7 @@ class StackMonitor:
         self.others_heard_at = 0.0  # monotonic seconds: the last status of a process that is not ours
         self._owns_pid = owns_pid
         self._host = os.uname().nodename
-        self._bus = Bus(url, "run_monitor")
+        self._bus = Bus(url, "run_monitor", hears_images=True)  # features and the map pass by on the main bus
         self._bus.subscribe(channel_prefix + STATUS, stage_status_t, self._on_status, secret)
         self._bus.subscribe(channel_prefix + POSE, pose_t, self._on_pose, secret)
 

@@ -1,12 +1,13 @@
 """The panel of a run: what it says of the camera, at 80 columns and wider."""
 
 import io
+from dataclasses import replace
 
 from rich.console import Console
 
 from tessera_cli.messages import pose_t
 from tessera_cli.runs.live_view import RunPanel
-from tessera_cli.supervision.progress import RUNNING, Progress, StageReport
+from tessera_cli.supervision.progress import FINISHED, RUNNING, Progress, StageReport
 
 
 def _pose(frame: int, state: int = pose_t.TRACKED, since_tracked_s: float = 0.0) -> pose_t:
@@ -78,3 +79,11 @@ def test_the_path_stays_bounded() -> None:
 def test_a_camera_without_an_end_has_no_time_left() -> None:
     assert " left" in _drawn(_progress(), 80)
     assert " left" not in _drawn(Progress(num_frames=None), 80)
+
+
+def test_an_evaluated_run_has_all_its_frames_also_those_whose_poses_were_missed() -> None:
+    progress = _progress(180)
+    assert "180/200 frames" in _drawn(progress, 80)
+    progress.add_report(replace(_report("evaluator"), state=FINISHED))
+    drawn = _drawn(progress, 80)
+    assert "200/200 frames" in drawn and "0:00 left" in drawn

@@ -16,6 +16,7 @@ from tessera_cli.runs.summary import (
     latency_warnings,
     occupancy_sha256,
     occupancy_warnings,
+    recording_warnings,
     scale_doubts,
     scale_warnings,
 )
@@ -192,6 +193,13 @@ def test_what_the_occupancy_map_lacks_is_told() -> None:
     assert "images of 3 keyframes" in lacks
     (unfinished,) = occupancy_warnings(_report("occupancy", RUNNING))
     assert "not finished" in unfinished
+
+
+def test_a_recording_with_gaps_is_told() -> None:
+    report = _report("recorder", FINISHED)
+    assert recording_warnings(None) == [] and recording_warnings(report) == []
+    (lacks,) = recording_warnings(replace(report, lost=761))
+    assert "lacks 761 messages" in lacks and "tessera log gaps run.lcmlog" in lacks
 
 
 def test_a_run_ends_when_all_that_write_its_files_have() -> None:
