@@ -101,7 +101,7 @@ STABLE_AFTER_S = 10.0
 KILL_TIMEOUT_S = 5.0
 # The state of another deputy's processes is unknown when it is older than this.
 REMOTE_STATE_TIMEOUT_S = 5.0
-# A deputy whose loop takes longer was itself suspended (Ctrl-Z) or did not get the processor.
+# A deputy or sheriff whose loop takes longer was itself suspended (Ctrl-Z) or did not get the processor.
 LONGEST_TURN_S = 1.0
 
 # --- Time-outs between sheriff and deputies -----------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Carries out scripts of a process list, step by step: start, stop, restart, wait."""
 
 import os
-import time
 from collections.abc import Callable, Iterable
 
 from tessera_cli.constants import LISTEN_S
@@ -104,13 +103,13 @@ class ScriptRunner:
 
     def wait(self, names: Iterable[str], status: str, timeout_s: float) -> None:
         """Until all are `status`: ready, finished or stopped. Raises RunError with the reason if that fails."""
-        until = time.monotonic() + timeout_s
+        until_s = self._sheriff.listened_s + timeout_s
         reported: dict[str, str] = {}
         while missing := [name for name in names if self._state(name) not in FULFILLED[status]]:
             self._report_restarts(missing, reported)
             if hopeless := [name for name in missing if self._state(name) in HOPELESS[status]]:
                 raise RunError(f"{self._describe(hopeless[0])}.")
-            if time.monotonic() > until:
+            if self._sheriff.listened_s > until_s:
                 described = "; ".join(map(self._describe, missing[:MAX_DESCRIBED]))
                 raise RunError(f"not {status} within {timeout_s:g} s: {described}.")
             self._sheriff.listen(LISTEN_S)

@@ -19,6 +19,7 @@ from tessera_cli.constants import (
     DISTRUST_TIMEOUT_S,
     FIND_DEPUTY_TIMEOUT_S,
     LISTEN_S,
+    LONGEST_TURN_S,
     ORDER_REPEAT_S,
     ORDER_TIMEOUT_S,
     PROCMAN_ORDER,
@@ -75,6 +76,8 @@ class Sheriff:
         self._status_handlers: list[Callable[[procman_status_t], None]] = []
         self._bus.subscribe(PROCMAN_STATUS, None, self._on_status)
         self._other_buses: list[Bus] = []
+        # Deadlines count the time in which deputies could be heard, not that in which this process was suspended.
+        self.listened_s = 0.0
         self.deputies: dict[str, KnownDeputy] = {}
 
     def _on_status(self, data: bytes) -> None:
@@ -100,7 +103,9 @@ class Sheriff:
 
     def listen(self, seconds: float) -> None:
         """Handles what arrives within this time."""
+        began = time.monotonic()
         listen([self._bus, *self._other_buses], seconds)
+        self.listened_s += min(time.monotonic() - began, seconds + LONGEST_TURN_S)
 
     def discover_deputies(self) -> None:
         """Returns when every deputy was heard once. Raises RunError if there is none."""
@@ -166,29 +171,37 @@ class Sheriff:
     def send(self, deputy: str, order: procman_order_t) -> str:
         """Repeats the order until the deputy has obeyed or refused it. Returns its id."""
         order.header, order.deputy, order.order = self._bus.header(PROCMAN_ORDER), deputy, draw_order_id()
-        began, repeat_at = time.monotonic(), 0.0
+        began_s, repeat_at, num_sent = self.listened_s, 0.0, 0
         distrusted = _num_distrusted(self.deputies[deputy].status)
         while (status := self.deputies[deputy].status).last_order != order.order:
-            waited_s = time.monotonic() - began
+            waited_s = self.listened_s - began_s
             is_distrusted = waited_s > DISTRUST_TIMEOUT_S and _num_distrusted(status) > distrusted
             if waited_s > ORDER_TIMEOUT_S or is_distrusted:
-                raise RunError(self._explain_silence(deputy, status))
+                raise RunError(self._explain_silence(deputy, num_sent))
             if time.monotonic() >= repeat_at:
                 # Another sheriff may have used the number meanwhile, or the deputy may have been restarted.
                 order.nonce, order.number = status.nonce, status.last_number + 1
                 self._bus.publish(PROCMAN_ORDER, sign(order, self._key))
+                num_sent += 1
                 repeat_at = time.monotonic() + ORDER_REPEAT_S
             self.listen(LISTEN_S)
         if status.last_refusal:
             raise RunError(f"{deputy} refuses: {status.last_refusal}")
         return order.order
 
-    def _explain_silence(self, deputy: str, status: procman_status_t) -> str:
-        if self.deputies[deputy].is_silent:
+    def _explain_silence(self, deputy: str, num_sent: int) -> str:
+        known = self.deputies[deputy]
+        if known.is_silent:
             return f"the deputy {deputy} no longer answers."
+        status = known.status
         refused = ", ".join(f"{number} {kind}" for kind, number in zip(status.kinds, status.num_refused))
+        if not refused:
+            return (
+                f"the deputy {deputy} answers, but hears no orders ({num_sent} sent; its last was number "
+                f"{status.last_number}): does its network let multicast in? Is its machine overloaded?"
+            )
         return (
-            f"the deputy {deputy} does not obey (it has refused: {refused or 'none'}): does it trust this user's key? "
+            f"the deputy {deputy} does not obey (it has refused: {refused}): does it trust this user's key? "
             "procman/tessera keys shows both."
         )
 
