@@ -25,8 +25,12 @@ DEVICE = "eth0"
 # Of a shaped link: what a port may send at once, and what it queues: a good switch. A cheap one has a tenth of it.
 BURST_BYTES = 64_000
 QUEUE_BYTES = 4_000_000
-# So that the bridge knows early who listens to what; in hundredths of a second.
-QUERY_RESPONSE = 50
+# So that the bridge knows early who listens to what; in hundredths of a second. Hosts speak version 3 of IGMP from the
+# start, and a query of version 2 makes them forget to tell what they joined just before it.
+SNOOPING = (
+    *("mcast_snooping", 1, "mcast_querier", 1, "mcast_igmp_version", 3, "mcast_query_response_interval", 50),
+    *("mcast_startup_query_interval", 100, "mcast_startup_query_count", 60),
+)
 
 
 @dataclass(frozen=True)
@@ -116,8 +120,7 @@ class Lan:
             ip("-n", self._space(1), "route", "add", "224.0.0.0/4", "dev", "lo")
             return
         ip("netns", "add", self._switch)
-        options = ("mcast_snooping", 1, "mcast_querier", 1, "mcast_query_response_interval", QUERY_RESPONSE)
-        ip("-n", self._switch, "link", "add", "switch", "type", "bridge", *options)
+        ip("-n", self._switch, "link", "add", "switch", "type", "bridge", *SNOOPING)
         ip("-n", self._switch, "link", "set", "switch", "up")
         for host, rate in self._rates.items():
             self._connect(host, rate)
