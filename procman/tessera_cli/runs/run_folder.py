@@ -102,6 +102,12 @@ def remove_journals(values: Settings) -> None:
         folder.rmdir()
 
 
+def keeps_journal(folder: Path, process: str) -> bool:
+    """Whether this process of the run that writes into the folder keeps a journal, by which a successor continues."""
+    journals = read_settings(folder / SETTINGS_FILE).get("stream", {}).get("journal_dir", "")
+    return bool(journals) and (Path(journals) / f"{process}.journal").is_file()
+
+
 @dataclass(frozen=True)
 class Frames:
     """frames.csv, n rows in order of the frames' numbers. What is unknown is NaN."""
