@@ -143,7 +143,10 @@ void StageEngine::KeepJournal(const std::vector<Channel>& inputs, const std::vec
   if (stream_settings_.journal_dir.empty()) return;
   const std::string path = stream_settings_.journal_dir + "/" + identity_.name + ".journal";
   journal_ = std::make_unique<Journal>(path, identity_.epoch_us, stream_settings_.journal_bytes);
-  if (journal_->is_lost()) return;
+  if (journal_->is_lost()) {
+    return ReportError("it was started again without what it knew: the journal " + path +
+                       " was given up, or its disk is broken");
+  }
   const auto names_of = [](const std::vector<Channel>& channels) {
     std::set<std::string> names;
     for (const Channel& channel : channels) names.insert(channel.name);
