@@ -300,6 +300,7 @@ class Launcher:
 
     def _summarize(self, wall_s: float, ended: str) -> Result:
         reports, processes = self._monitor.progress.stages.values(), self._deputy.processes
+        occupancy = self._monitor.progress.stages.get("occupancy")
         run_facts = RunFacts(
             source=self._source.text or "bus:",
             sensor=self._arguments.sensor,
@@ -318,8 +319,9 @@ class Launcher:
             warnings=self._deputy.warnings
             + self._silence.warnings
             + self._missing_frames()
-            + occupancy_warnings(self._monitor.progress.stages.get("occupancy"))
+            + occupancy_warnings(occupancy)
             + recording_warnings(self._monitor.progress.stages.get("recorder")),
+            later_values={occupancy.name: occupancy.values} if occupancy else {},
         )
         return write_summary(self._folder, run_facts, process_facts)
 
