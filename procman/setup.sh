@@ -126,7 +126,8 @@ make_python_env() {
   printf '%s\n' "$wanted" >"$stamp_file"
 }
 
-# add_viewer: what `tessera view` needs, into .venv, unless it is there already.
+# add_viewer: what `tessera view` needs, into .venv, unless it is there already. Called by tessera_cli/viewing/window.py, once
+# it is known that there is something to show.
 add_viewer() {
   local requirements="$root/procman/requirements-view.txt" stamp_file="$root/.venv/.viewer-stamp" wanted have=""
   wanted="$(<"$root/.venv/.tessera-stamp") $(sha256sum <"$requirements")"

@@ -82,10 +82,17 @@ Journal::Journal(std::string path, int64_t epoch_us, int64_t max_bytes)
   std::filesystem::create_directories(std::filesystem::path(path_).parent_path(), ignored);
   reader_.reset(std::fopen(path_.c_str(), "rbe"));
   if (!reader_) {
+    is_lost_ = errno == EIO;
+    if (is_lost_) return;
     if (errno != ENOENT) ThrowUnusable(path_);
     Begin(epoch_us);
   }
   file_ = open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (file_ < 0 && reader_) {
+    is_lost_ = true;
+    reader_.reset();
+    return;
+  }
   if (file_ < 0) ThrowUnusable(path_);
   if (!reader_) return;
   std::fseek(reader_.get(), 0, SEEK_END);

@@ -26,8 +26,8 @@ class Journal {
   };
 
   // Continues the journal PATH, or begins it: a life that starts at `epoch_us` then. The folder is made if it is not
-  // there. A journal that would be larger than `max_bytes`, or that the disk has no room for, is given up. Throws
-  // InputError if the file can't be read or begun.
+  // there. A journal that would be larger than `max_bytes`, or that the disk has no room for, is given up; so is one
+  // whose disk has broken since it was begun. Throws InputError if the file can't be begun.
   Journal(std::string path, int64_t epoch_us, int64_t max_bytes);
   ~Journal();
   Journal(const Journal&) = delete;
@@ -35,7 +35,7 @@ class Journal {
 
   // When the first life began of those that it holds.
   int64_t epoch_us() const { return epoch_us_; }
-  // An earlier life had to give it up: it holds nothing, and takes nothing.
+  // An earlier life had to give it up, or its disk is broken: it holds nothing, and takes nothing.
   bool is_lost() const { return is_lost_; }
 
   // There are entries of an earlier life that Next() has not given yet, or it was not asked.

@@ -14,23 +14,25 @@ std::string Describe(const std::string& name, const std::string& host, int32_t p
 
 }  // namespace
 
-void Neighbors::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat,
+bool Neighbors::OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat,
                             int64_t now_us) {
   if (epoch_us == own_.epoch_us && heartbeat.pid == own_.pid && heartbeat.host == own_.host) {
-    return;
+    return false;
   }
   std::erase_if(neighbors_, [&](const auto& entry) { return now_us - entry.second.heard_us > kMemoryUs; });
   const auto [begin, end] = neighbors_.equal_range(epoch_us);
   auto it = begin;
   while (it != end && (it->second.name != publisher || it->second.pid != heartbeat.pid)) ++it;
-  if (it == end) {
-    if (neighbors_.size() >= kMaxNeighbors) return;
+  const bool is_new = it == end;
+  if (is_new) {
+    if (neighbors_.size() >= kMaxNeighbors) return false;
     it = neighbors_.emplace(epoch_us, Neighbor{publisher, heartbeat.host, heartbeat.pid, 0, {}});
   }
   it->second.heard_us = now_us;
   for (const StreamHead& stream : heartbeat.streams) {
     if (stream.is_exclusive) it->second.exclusive_channels.insert(stream.channel);
   }
+  return is_new;
 }
 
 bool Neighbors::IsAliveAndOlder(int64_t epoch_us, const Neighbor& neighbor, int64_t now_us) const {

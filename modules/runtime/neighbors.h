@@ -16,7 +16,8 @@ class Neighbors {
  public:
   explicit Neighbors(const StageIdentity& own) : own_(own) {}
 
-  void OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat, int64_t now_us);
+  // Returns whether it is of a process that was not heard of within the last second.
+  bool OnHeartbeat(const std::string& publisher, int64_t epoch_us, const Heartbeat& heartbeat, int64_t now_us);
 
   // Of two processes in conflict the one that started later has to end. These give its sentence if that is this one,
   // and the other was heard of within the last second.

@@ -73,7 +73,7 @@ class StageContext {
   // what it returns: this. Timers and idle tasks rest until all of the journal was given. Throws InputError if it can't
   // be kept.
   StageContext& KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs);
-  // This process was started again, and its journal was given up before: it begins with nothing.
+  // This process was started again, and its journal was given up before or can't be read: it begins with nothing.
   bool has_lost_journal() const;
   // This process was started again, as one that keeps a journal can tell.
   bool was_restarted() const;

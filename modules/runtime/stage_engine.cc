@@ -17,8 +17,9 @@ namespace {
 
 constexpr int kMaxMessagesPerBus = 64;  // handled in one round, so that timers and other buses get their turn
 constexpr int64_t kStatusPeriodUs = 500'000;
-constexpr int64_t kMaxErrorsPerSecond = 10;  // that are logged; all are counted
-constexpr size_t kMaxPublishers = 4096;      // of one channel
+constexpr int64_t kMaxErrorsPerSecond = 10;    // that are logged; all are counted
+constexpr size_t kMaxPublishers = 4096;        // of one channel
+constexpr int64_t kHeartbeatsAfterValue = 10;  // after so many that told of the last value, they become rarer
 
 }  // namespace
 
@@ -35,7 +36,7 @@ StageEngine::StageEngine(Setup setup)
       incoming_(stream_settings_, *clock_, [this](const std::string& sentence) { ReportError(sentence); }),
       root_(setup.root != nullptr ? setup.root : this) {
   talks_ = BusOf(kHeartbeat)->can_listen();
-  heartbeat_due_us_ = status_due_us_ = clock_->NowUs();
+  heartbeat_due_us_ = status_due_us_ = sent_us_ = clock_->NowUs();
   if (!talks_) return;
   heartbeat_stream_ = Advertise(kHeartbeat);
   repair_stream_ = Advertise(kRepair);
@@ -92,7 +93,8 @@ void StageEngine::Send(int stream, const Encoder& encode, std::optional<int64_t>
   if (!is_sent) ReportError("the operating system refused to send a message on " + channel.name);
   if (channel.delivery == Delivery::kUnordered) return;
   ++figures_.num_published;
-  soon_due_us_ = clock_->NowUs() + stream_settings_.receiver.repair_us;
+  sent_us_ = clock_->NowUs();
+  soon_due_us_ = sent_us_ + stream_settings_.receiver.repair_us;
 }
 
 template <class Value>
@@ -141,7 +143,10 @@ void StageEngine::KeepJournal(const std::vector<Channel>& inputs, const std::vec
   if (stream_settings_.journal_dir.empty()) return;
   const std::string path = stream_settings_.journal_dir + "/" + identity_.name + ".journal";
   journal_ = std::make_unique<Journal>(path, identity_.epoch_us, stream_settings_.journal_bytes);
-  if (journal_->is_lost()) return;
+  if (journal_->is_lost()) {
+    return ReportError("it was started again without what it knew: the journal " + path +
+                       " was given up, or its disk is broken");
+  }
   const auto names_of = [](const std::vector<Channel>& channels) {
     std::set<std::string> names;
     for (const Channel& channel : channels) names.insert(channel.name);
@@ -204,7 +209,9 @@ void StageEngine::ListenToExtractors(const Heartbeat& heartbeat) {
 
 void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageInfo& info) {
   const int64_t now_us = clock_->NowUs();
-  neighbors_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat, now_us);
+  // One that has just come must not wait for what an idle process says seldom.
+  const bool is_new = neighbors_.OnHeartbeat(info.publisher, info.epoch_us, heartbeat, now_us);
+  if (is_new) soon_due_us_ = std::min(soon_due_us_, now_us + stream_settings_.receiver.repair_us);
   if (incoming_.hears_all()) ListenToExtractors(heartbeat);
   incoming_.OnHeartbeat(info.publisher, heartbeat);
   auto conflict = neighbors_.ConflictOverName(now_us);
@@ -216,9 +223,14 @@ void StageEngine::OnHeartbeat(const Heartbeat& heartbeat, const MessageInfo& inf
   if (conflict && !stopped_) Fail(*conflict, 1);
 }
 
+int64_t StageEngine::HeartbeatPeriodUs(int64_t now_us) const {
+  const bool is_idle = now_us - sent_us_ > kHeartbeatsAfterValue * stream_settings_.heartbeat_us;
+  return is_idle ? stream_settings_.idle_heartbeat_us : stream_settings_.heartbeat_us;
+}
+
 void StageEngine::SendHeartbeats() {
   const int64_t now_us = clock_->NowUs();
-  heartbeat_due_us_ = now_us + stream_settings_.heartbeat_us;
+  heartbeat_due_us_ = now_us + HeartbeatPeriodUs(now_us);
   soon_due_us_ = INT64_MAX;
   if (!talks_) return;
   for (const Heartbeat& heartbeat : outgoing_.MakeHeartbeats()) {

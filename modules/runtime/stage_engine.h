@@ -115,6 +115,7 @@ class StageEngine {
   bool is_over() const { return stopped_ || root_->stopped_; }
   bool HandleMessages();
   void ReplayOne();
+  int64_t HeartbeatPeriodUs(int64_t now_us) const;
   void RunTimers();
   void AskForRepairs();
   bool RunIdleTasks();
@@ -127,7 +128,8 @@ class StageEngine {
   int status_stream_ = -1;
   bool hears_repairs_ = false;
   int64_t heartbeat_due_us_ = 0;     // the next regular one
-  int64_t soon_due_us_ = INT64_MAX;  // the one soon after a value was sent
+  int64_t soon_due_us_ = INT64_MAX;  // the one soon after a value was sent, or another process appeared
+  int64_t sent_us_ = 0;              // when the last value was sent, or this process began
   int64_t status_due_us_ = 0;
   int64_t num_errors_ = 0;  // reported within the second that began at
   int64_t errors_since_us_ = 0;

@@ -24,11 +24,12 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   result.max_local_message_bytes = static_cast<size_t>(bus.max_local_message_bytes);
   result.history_bytes = static_cast<size_t>(stream.history_bytes);
   result.heartbeat_us = 1000LL * stream.heartbeat_ms;
+  result.idle_heartbeat_us = 4 * result.heartbeat_us;
   StreamReceiverOptions& receiver = result.receiver;
   receiver.repair_us = 1000LL * stream.repair_ms;
   receiver.give_up_us = 1000LL * stream.give_up_ms;
   receiver.give_up_silent_us = 10 * receiver.give_up_us;
-  receiver.silent_us = std::max<int64_t>(500'000, 5 * result.heartbeat_us);
+  receiver.silent_us = std::max<int64_t>(500'000, 3 * result.idle_heartbeat_us);
   receiver.unwatched_us = std::max<int64_t>(300'000, 3 * result.heartbeat_us);
   receiver.max_asked = MaxAsked(result, std::max(result.max_message_bytes, result.max_local_message_bytes));
   receiver.max_waiting_bytes = result.history_bytes;

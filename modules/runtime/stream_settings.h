@@ -20,6 +20,7 @@ struct StreamSettings {
   size_t max_local_message_bytes = 0;  // of the buses of camera and map
   size_t history_bytes = 0;
   int64_t heartbeat_us = 0;
+  int64_t idle_heartbeat_us = 0;  // of a process that sent nothing for a while
   StreamReceiverOptions receiver;
   std::string journal_dir;  // empty: no journals are kept
   int64_t journal_bytes = 0;

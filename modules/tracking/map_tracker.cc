@@ -96,7 +96,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   std::optional<FrameSearch> search;
   if (last_ && !is_localized) search.emplace(SearchFor(view));
   if (is_localized || (search && Localize(view, *search))) {
-    result.pose.num_matches = last_->frame.NumPoints();
+    CountPoints(result.pose);
     result.pose.is_relocalized = before == State::kLost || is_answered;
     result.pose.state = TrackingState::kTracked;
     if (options_.makes_keyframes && IsKeyframeDue()) {
@@ -104,7 +104,6 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
       result.keyframes.push_back(MakeKeyframe(last_->frame, reference_, last_->reference_from_camera));
     }
   } else if (before == State::kTracking && search && FollowPair(*search, result.keyframes)) {
-    result.pose.num_matches = last_->frame.NumPoints();
     result.pose.state = TrackingState::kTracked;
   } else if (may_ask && CanAskFor(*view)) {
     asked_ = view;
@@ -141,17 +140,23 @@ bool MapTracker::CanAskFor(const FrameView& view) const {
   return has_map() && view.size() >= options_.min_relocalized_inliers;
 }
 
+// To be called before a new keyframe adds points, which would agree with a pose that they had no part in.
+void MapTracker::CountPoints(PoseEstimate& pose) const {
+  pose.num_inliers = last_->frame.NumPoints();
+  pose.num_matches = pose.num_inliers + last_->num_outliers;
+  pose.coverage = CellCoverage(last_->frame);
+}
+
 // The frame was tracked, and is now the last one.
 void MapTracker::DescribePose(MapTrackingResult& result) {
   lost_since_us_.reset();
   result.pose.world_from_camera = last_->frame.world_from_camera;
   result.pose.reference_keyframe = reference_;
   result.pose.reference_from_camera = last_->reference_from_camera;
-  result.pose.num_inliers = last_->frame.NumPoints();
+  if (result.pose.num_inliers == 0) CountPoints(result.pose);  // a map begins: its first points
   result.pose.is_keyframe = !result.keyframes.empty();
   result.pose.is_step_doubtful = last_->evidence == StepEvidence::kContradictory;
   result.pose.scale_sigma = scale_.RecentDrift(result.pose.utime_us);
-  result.pose.coverage = CellCoverage(last_->frame);
   result.pose.body = DescribeBody();
   tracked_utime_us_ = result.pose.utime_us;
 }
@@ -284,11 +289,14 @@ bool MapTracker::Localize(const Frame& view, FrameSearch& search) {
   const int min_of_last = static_cast<int>(options_.min_share_of_last * last_->frame.NumPoints());
   const int min_inliers =
       lost_since_us_ ? options_.min_relocalized_inliers : std::max(options_.min_inliers, min_of_last);
+  const int num_matches = frame.NumPoints();
   const FramePose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < min_inliers) return false;
   // After a loss the greater number of inliers says as much.
   if (!lost_since_us_ && found->is_doubtful && Coverage(around, frame) < kMinCoverage) return false;
+  const int num_outliers = num_matches - frame.NumPoints();
   Remember(std::move(frame), pose, found->is_wide);
+  last_->num_outliers = num_outliers;
   return true;
 }
 

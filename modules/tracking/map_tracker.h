@@ -93,6 +93,7 @@ class MapTracker {
     bool is_wide_step = false;                               // FoundFrame::is_wide
     std::optional<PoseInfluences> influences = std::nullopt;
     std::optional<Matrix6d> pose_covariance = std::nullopt;  // of the way from the reference to here
+    int num_outliers = 0;                                    // points that were matched and contradict the pose
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -112,6 +113,7 @@ class MapTracker {
   };
 
   MapTrackingResult UndecidedResult(const FrameView& view) const;
+  void CountPoints(PoseEstimate& pose) const;
   void DescribePose(MapTrackingResult& result);
   BodyState DescribeBody() const;
   bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);

@@ -70,8 +70,8 @@ LINE_PERIOD_S = 5.0
 FRAME_RATE_WINDOW_S = 5.0
 
 # --- Time-outs of a run -------------------------------------------------------------------------------------------
-# A bus without a heartbeat for this long is free: every stage sends ten a second.
-FREE_BUS_S = 0.25
+# A bus without a heartbeat for this long is free: also a stage that has nothing to say sends one each 0.4 s.
+FREE_BUS_S = 0.5
 # A process that does not report within this time never will; LCM's self-test alone may take 10 s.
 START_TIMEOUT_S = 20.0
 # A stored source without a new pose for this long is stuck, unless a stage works on the map: repairs and late tiles

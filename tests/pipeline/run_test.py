@@ -118,6 +118,8 @@ def test_cut_and_shared_out_and_listened_to_gives_the_same(
     assert reference_run.summary["occupancy_sha256"] is None
     tree = (finished.folder / "occupancy.bt").read_bytes()
     assert finished.summary["occupancy_sha256"] == hashlib.sha256(tree).hexdigest()
+    # Told when it was done, after the evaluator.
+    assert finished.summary["stage_values"]["occupancy"]["keyframes_without_scan"] == 0
     assert {"occupancy.ot", "occupancy.pgm", "occupancy.yaml"} <= {path.name for path in finished.folder.iterdir()}
 
 

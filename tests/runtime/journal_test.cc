@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <optional>
 #include <set>
 #include <string>
@@ -102,6 +103,16 @@ TEST_F(JournalTest, OneThatGrowsTooLargeIsGivenUpAndGivesItsRoomBack) {
 TEST_F(JournalTest, AnEmptyOneWasGivenUpOnAFullDisk) {
   folder_.Write("journal/tracker.journal", "");
   EXPECT_TRUE(Journal(path_, 78, kMaxBytes).is_lost());
+}
+
+// As files are of a disk that has become read-only since they were begun; here of the kernel, which nobody can write.
+TEST_F(JournalTest, OneThatCantBeWrittenAnyMoreIsGivenUp) {
+  const std::string unwritable = "/sys/devices/system/cpu/online";
+  if (!std::filesystem::exists(unwritable)) GTEST_SKIP() << "no sysfs";
+  Journal journal(unwritable, 78, kMaxBytes);
+  EXPECT_TRUE(journal.is_lost());
+  EXPECT_FALSE(journal.is_replaying());
+  EXPECT_TRUE(journal.Append("POSE", MessageOf(0), 0));
 }
 
 TEST_F(JournalTest, AFolderThatCantBeMadeIsAUserError) {

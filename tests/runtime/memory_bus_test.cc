@@ -103,6 +103,66 @@ TEST(MemoryBus, LossesAreRepairedAndCounted) {
   EXPECT_EQ(pair.status.num_received, 100);
 }
 
+// How many heartbeats of the camera are heard within a second.
+class HeartbeatCount {
+ public:
+  explicit HeartbeatCount(MemoryBus& bus) : bus_(bus) {
+    bus.AddContext("counter").Subscribe(kHeartbeat, [this](const Heartbeat&, const MessageInfo& info) {
+      count_ += info.publisher == "camera" ? 1 : 0;
+    });
+  }
+  int64_t NextSecond() {
+    const int64_t before = count_;
+    bus_.RunUntil([] { return false; }, 1.0);
+    return count_ - before;
+  }
+
+ private:
+  MemoryBus& bus_;
+  int64_t count_ = 0;
+};
+
+TEST(MemoryBus, HeartbeatsAreRareOfWhoHasNothingToSay) {
+  MemoryBus bus(Defaults());
+  Pair pair(bus);
+  pair.StartCamera();
+  HeartbeatCount heartbeats(bus);
+  EXPECT_GE(heartbeats.NextSecond(), 9) << "it has just begun";
+  heartbeats.NextSecond();
+  EXPECT_LE(heartbeats.NextSecond(), 3);
+  pair.Send(1);
+  EXPECT_GE(heartbeats.NextSecond(), 9) << "the message may have been lost";
+  heartbeats.NextSecond();
+  EXPECT_LE(heartbeats.NextSecond(), 3);
+}
+
+TEST(MemoryBus, AnIdleProcessAnswersANewOneAtOnce) {
+  MemoryBus bus(Defaults());
+  Pair pair(bus);
+  pair.StartCamera();
+  pair.Send(5);
+  bus.RunUntil([] { return false; }, 5.0);
+  pair.StartListener();
+  EXPECT_TRUE(bus.RunUntil([&] { return pair.received.size() == 5; }, 0.1));
+}
+
+// What was sent is repaired also where most heartbeats are lost.
+TEST(MemoryBus, ALostTailOfAnIdleProcessIsRepaired) {
+  MemoryBus bus(Defaults());
+  Pair pair(bus);
+  pair.StartListener();
+  pair.StartCamera();
+  bus.RunUntil([] { return false; }, 5.0);
+  bool is_lossy = true;
+  bus.LoseMessages([&](const std::string& channel) { return is_lossy && channel != "STATUS"; });
+  pair.Send(3);
+  bus.RunUntil([] { return false; }, 2.0);
+  EXPECT_TRUE(pair.received.empty());
+  is_lossy = false;
+  EXPECT_TRUE(bus.RunUntil([&] { return pair.received.size() == 3; }, 0.6));
+  EXPECT_EQ(pair.status.num_lost, 0);
+}
+
 TEST(MemoryBus, WhoComesLateGetsWhatIsKept) {
   MemoryBus bus(Defaults());
   Pair pair(bus);

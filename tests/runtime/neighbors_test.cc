@@ -42,7 +42,7 @@ TEST(Neighbors, SharedChannelsAreNoConflict) {
 
 TEST(Neighbors, AProcessThatIsSilentForASecondIsGone) {
   Neighbors neighbors(Own());
-  neighbors.OnHeartbeat("tracker", kOwnEpochUs - 1, HeartbeatOf(8), 0);
+  EXPECT_TRUE(neighbors.OnHeartbeat("tracker", kOwnEpochUs - 1, HeartbeatOf(8), 0)) << "it is new";
   EXPECT_TRUE(neighbors.ConflictOverName(1'000'000));
   EXPECT_FALSE(neighbors.ConflictOverName(1'000'001));
 }

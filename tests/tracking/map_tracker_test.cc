@@ -56,6 +56,20 @@ TEST(MapTracker, FollowsAStereoDrive) {
   EXPECT_GT(outcome.keyframes.size(), 3U);
 }
 
+// A keyframe's new points are no inliers of its pose.
+TEST(MapTracker, InliersAreSomeOfTheMatches) {
+  for (const SensorType sensor : {SensorType::kStereo, SensorType::kMono}) {
+    Outcome outcome;
+    Follow(SyntheticWorld(sensor, 0.3), 40, 3, {}, outcome);
+    for (const PoseEstimate& pose : outcome.poses) {
+      if (pose.state != TrackingState::kTracked) continue;
+      EXPECT_GT(pose.num_inliers, 0) << pose.frame.value;
+      EXPECT_LE(pose.num_inliers, pose.num_matches) << pose.frame.value;
+      EXPECT_GT(pose.coverage, 0.0) << pose.frame.value;
+    }
+  }
+}
+
 TEST(MapTracker, KeyframesOfASteadyCameraSayWhereItWasExpected) {
   Outcome outcome;
   Follow(SyntheticWorld(SensorType::kStereo, 0.3), 40, 3, {}, outcome);

@@ -51,7 +51,8 @@ TrackerStage::TrackerStage(StageContext& context)
       base_from_camera_(context.settings().Get<BodySettings>().BaseFromCamera()),
       watches_latency_(WatchesLatency(context.settings().Get<TrackerSettings>())) {
   if (context.has_lost_journal()) {
-    throw std::runtime_error("it can't continue where it was killed: its journal had been given up before");
+    throw std::runtime_error(
+        "it can't continue where it was killed: its journal had been given up before, or its disk is broken");
   }
   poses_ = context.Advertise(kPose);
   keyframes_ = context.Advertise(kKeyframe);

@@ -26,7 +26,14 @@ from tessera_cli.interrupt import Interrupt
 from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
 from tessera_cli.runs.ports import PortLock, take_free_port
-from tessera_cli.runs.run_folder import Result, choose_folder, remove_earlier_run, remove_journals, require_no_run
+from tessera_cli.runs.run_folder import (
+    Result,
+    choose_folder,
+    leave_journals,
+    remove_earlier_run,
+    remove_journals,
+    require_no_run,
+)
 from tessera_cli.runs.run_settings import run_assignments
 from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import (
@@ -104,7 +111,7 @@ def _make_launcher(
     remove_earlier_run(folder)
     values = write_settings(assignments, folder / "settings.yaml")
     remove_journals(values)
-    cleanup.callback(remove_journals, values)
+    cleanup.callback(leave_journals, values)
     if run_dir := _take_bus(arguments, source, values):
         cleanup.callback(run_dir.end)
     processes = [_without_journal(process, values) for process in process_list.processes.values()]
@@ -293,6 +300,7 @@ class Launcher:
 
     def _summarize(self, wall_s: float, ended: str) -> Result:
         reports, processes = self._monitor.progress.stages.values(), self._deputy.processes
+        occupancy = self._monitor.progress.stages.get("occupancy")
         run_facts = RunFacts(
             source=self._source.text or "bus:",
             sensor=self._arguments.sensor,
@@ -311,8 +319,9 @@ class Launcher:
             warnings=self._deputy.warnings
             + self._silence.warnings
             + self._missing_frames()
-            + occupancy_warnings(self._monitor.progress.stages.get("occupancy"))
+            + occupancy_warnings(occupancy)
             + recording_warnings(self._monitor.progress.stages.get("recorder")),
+            later_values={occupancy.name: occupancy.values} if occupancy else {},
         )
         return write_summary(self._folder, run_facts, process_facts)
 

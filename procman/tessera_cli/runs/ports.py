@@ -48,7 +48,7 @@ def _candidates() -> Iterator[int]:
 
 
 def _is_silent(port: int, channel_prefix: str) -> bool:
-    """Every stage sends ten heartbeats a second. A port that another program holds for itself is not silent."""
+    """Every stage sends heartbeats. A port that another program holds for itself is not silent."""
     heard: list[bytes] = []
     try:
         bus = Bus(bus_url(port), "port_finder")

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT, absolute
 from tessera_cli.maps.occupancy_file import Grid, read_grid
@@ -100,6 +101,20 @@ def remove_journals(values: Settings) -> None:
         journal.unlink()
     if folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
+
+
+def keeps_journal(folder: Path, process: str) -> bool:
+    """Whether this process of the run that writes into the folder keeps a journal, by which a successor continues."""
+    journals = read_settings(folder / SETTINGS_FILE).get("stream", {}).get("journal_dir", "")
+    return bool(journals) and (Path(journals) / f"{process}.journal").is_file()
+
+
+def leave_journals(values: Settings) -> None:
+    """As far as a disk that has broken since lets them be removed. Nobody needs them when a run is over."""
+    try:
+        remove_journals(values)
+    except OSError as error:
+        say(f"the journals of this run could not be removed: {error.filename}: {error.strerror}")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,8 @@ class ProcessFacts:
     max_rss_mb: dict[str, float]
     num_extractor_restarts: int
     warnings: list[str]
+    # By stage: what those told that worked on when the evaluator had ended.
+    later_values: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
 def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Result:
@@ -95,6 +97,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         "tiles": facts.tiles,
         "ended": judge_end(facts.ended, evaluated),
         **{key: evaluated.get(key) for key in EVALUATOR_KEYS},
+        "stage_values": {**evaluated.get("stage_values", {}), **processes.later_values},
         "occupancy_sha256": occupancy_sha256(folder),
         "rms_error_m": result.error.rms_m if result.error else None,
         "alignment": _describe_alignment(result),

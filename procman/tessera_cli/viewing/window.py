@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import subprocess
 import time
 from argparse import Namespace
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tessera_cli.console import say
 from tessera_cli.errors import RunError, UserError
-from tessera_cli.files import absolute, replacing
+from tessera_cli.files import ROOT, absolute, replacing
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.viewing.scene import Look
 from tessera_cli.viewing.viewer_process import ViewerProcess, has_display, is_whole
@@ -74,10 +75,10 @@ class View:
 @contextmanager
 def open_view(arguments: Namespace, title: str) -> Iterator[View]:
     """The viewer starts at once, beside whatever is read to be shown. Raises UserError, RunError."""
-    require_package()
     path = absolute(arguments.save) if arguments.save else None
     if path and (path.suffix != ".rrd" or path.is_dir() or not path.parent.is_dir()):
         raise UserError(f"{path} can't be written: name a file that ends in .rrd, in a folder that exists.")
+    add_package()
     process = _start_viewer(arguments)
     try:
         if path is None:
@@ -95,9 +96,9 @@ def open_view(arguments: Namespace, title: str) -> Iterator[View]:
 
 def show_recording(arguments: Namespace, recording: Path) -> None:
     """A file that --save wrote, until the window is closed or Ctrl-C."""
-    require_package()
     if not recording.is_file():
         raise UserError(f"{recording}: there is no such file.")
+    add_package()
     if not is_whole(recording):
         say(f"{recording} is cut off or damaged: what can be read of it is shown")
     process = _open_viewer(arguments, recording)
@@ -110,9 +111,13 @@ def show_recording(arguments: Namespace, recording: Path) -> None:
         view.close()
 
 
-def require_package() -> None:
-    if importlib.util.find_spec("rerun") is None:
-        raise RunError("the viewer's package rerun-sdk is missing: procman/tessera view installs it.")
+def add_package() -> None:
+    """Installs rerun-sdk, unless it is there already. Raises RunError if that fails, after what setup.sh says."""
+    script = 'root="$1"; . "$root/procman/setup.sh"; add_viewer'
+    added = subprocess.run(["bash", "-euo", "pipefail", "-c", script, "tessera", str(ROOT)], stdin=subprocess.DEVNULL)
+    importlib.invalidate_caches()
+    if added.returncode != 0 or importlib.util.find_spec("rerun") is None:
+        raise RunError("without the package rerun-sdk nothing can be shown.")
 
 
 def _view(title: str, process: ViewerProcess | None, path: Path | None) -> Iterator[View]:

@@ -1,7 +1,6 @@
 """Where `tessera view` can't show anything it says why, in one sentence."""
 
 import socket
-import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,18 @@ from tessera_cli.viewing import viewer_process, window
 from tessera_cli.viewing.scene import INLIERS_PLOT, Look, Moment, Picture, Points, PointSeries, Poses, Series
 from tessera_cli.viewing.view_run import view_run
 from tessera_cli.viewing.viewer_process import LOOPBACK, ViewerProcess
+from tessera_cli.viewing.window import add_package as add_for_real
 from tessera_cli.viewing.window import open_view
 
 
 def arguments(run: Path, **changes: Any) -> Namespace:
     return Namespace(**{"run": str(run), "web": True, "web_port": 9090, "save": None, **changes})
+
+
+@pytest.fixture(autouse=True)
+def installs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """230 MB are only for those who have something to look at."""
+    monkeypatch.setattr(window, "add_package", lambda: pytest.fail("the viewer would be installed"))
 
 
 def test_folders_without_a_map_are_refused(tmp_path: Path) -> None:
@@ -29,19 +35,27 @@ def test_folders_without_a_map_are_refused(tmp_path: Path) -> None:
         view_run(arguments(write_run(tmp_path / "run")))
 
 
-def test_a_missing_package_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(RunError, match="rerun-sdk is missing"), open_view(arguments(tmp_path), "a run"):
-        pass
+def test_a_view_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="there is no such file"):
+        view_run(arguments(tmp_path / "none.rrd"))
+
+
+def test_a_package_that_cant_be_installed_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    procman = tmp_path / "procman"
+    procman.mkdir()
+    (procman / "setup.sh").write_text("add_viewer() { echo 'tessera: is this machine online?' >&2; exit 1; }\n")
+    monkeypatch.setattr(window, "ROOT", tmp_path)
+    with pytest.raises(RunError, match="rerun-sdk"):
+        add_for_real()
+    assert "online?" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["view.txt", "none/view.rrd", "."])
-def test_files_that_cant_be_written_are_refused(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(window, "require_package", lambda: None)
-    with (
-        pytest.raises(UserError, match="can't be written"),
-        open_view(arguments(tmp_path, save=str(tmp_path / name)), "a run"),
-    ):
+def test_files_that_cant_be_written_are_refused(tmp_path: Path, name: str) -> None:
+    save = str(tmp_path / name)
+    with pytest.raises(UserError, match="can't be written"), open_view(arguments(tmp_path, save=save), "a run"):
         pass
 
 

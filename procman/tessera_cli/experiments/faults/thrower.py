@@ -15,6 +15,7 @@ from tessera_cli.experiments.faults import network
 from tessera_cli.experiments.faults.schedule import KILL, LOSS, SLOW, STOP, Fault
 from tessera_cli.lcm_bus import Bus, listen
 from tessera_cli.messages import pose_t
+from tessera_cli.runs.run_folder import keeps_journal
 from tessera_cli.supervision.process_tree import marked
 from tessera_cli.supervision.progress import is_tracker_pose
 
@@ -23,8 +24,7 @@ SLOW_SHARE = 0.1
 LISTEN_S = 0.01
 # A process that has not been there for so long has ended: its fault is left out.
 MISSING_S = 10.0
-# These continue by their journals, and say then (stage_engine.cc) that they are where they were.
-JOURNALED = ("tracker", "mapper", "loop_closer", "global_adjuster", "evaluator")
+# What one that keeps a journal says (stage_engine.cc) when it has continued by it.
 IS_BACK = "continues where it was when it was killed"
 # Poses of so many frames may follow a death that none of them needed: dispatcher.max_frames_in_flight, and some more.
 IN_FLIGHT = 10
@@ -59,7 +59,8 @@ class Thrower:
         self._due_s: float | None = None
         self._undo_at: float | None = None
         self._undo: Callable[[], None] = _nothing
-        self._num_back = 0  # times that the process that was killed had come back before
+        self._is_journaled = False  # the process that was killed last
+        self._num_back = 0  # times that it had come back before
         self._last_frame = -1
         self.pose_times: list[float] = []  # monotonic seconds, of frames that had none before
         self.thrown: list[Thrown] = []
@@ -113,7 +114,7 @@ class Thrower:
         fault = self.thrown[-1]
         if fault.kind != KILL:
             return True
-        if fault.process in JOURNALED:
+        if self._is_journaled:
             return self._count_back(fault.process) > self._num_back
         return self._last_frame >= fault.frame + IN_FLIGHT
 
@@ -133,6 +134,7 @@ class Thrower:
             for pid in pids:
                 groups.join(0, pid)
             return lambda: groups.set_share(1.0)
+        self._is_journaled = keeps_journal(self._folder, fault.process)
         self._num_back = self._count_back(fault.process)
         _send(pids, {KILL: signal.SIGKILL, STOP: signal.SIGSTOP}[fault.kind])
         return (lambda: _send(pids, signal.SIGCONT)) if fault.kind == STOP else _nothing

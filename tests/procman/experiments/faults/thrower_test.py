@@ -15,6 +15,7 @@ from tessera_cli.experiments.faults.schedule import KILL, STOP, Fault
 from tessera_cli.experiments.faults.thrower import IN_FLIGHT, IS_BACK, Thrower
 from tessera_cli.lcm_bus import Bus, bus_url
 from tessera_cli.messages import pose_t
+from tessera_cli.runs.run_folder import SETTINGS_FILE
 from tessera_cli.supervision.process_tree import MARK
 from tessera_cli.supervision.silence import is_stopped
 
@@ -69,6 +70,8 @@ def test_the_next_fault_waits_until_what_was_killed_is_back(tmp_path: Path, mapp
     log = tmp_path / "stages" / "mapper.log"
     log.parent.mkdir()
     log.write_text(f"mapper info: {IS_BACK}\n")  # of an earlier life
+    (tmp_path / "mapper.journal").touch()
+    (tmp_path / SETTINGS_FILE).write_text(f"stream: {{journal_dir: '{tmp_path}'}}\n")
     tracker = Tracker()
     with thrower_of(tmp_path, [Fault("mapper", KILL, 0.0, 0.0), Fault("mapper", STOP, 60.0, 1.0)]) as thrower:
         for _ in range(20):
