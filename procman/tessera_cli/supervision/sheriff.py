@@ -129,9 +129,9 @@ class Sheriff:
 
     def require_deputies(self, ids: list[str]) -> None:
         """Waits for them. Raises UserError that names those that do not answer."""
-        until = time.monotonic() + FIND_DEPUTY_TIMEOUT_S
+        until_s = self.listened_s + FIND_DEPUTY_TIMEOUT_S
         while missing := [name for name in ids if name not in self.deputies]:
-            if time.monotonic() > until:
+            if self.listened_s > until_s:
                 if any(name in self._words.unknown for name in missing):
                     raise UserError(f"{self._unknown_hint()}.")
                 raise UserError(

@@ -1,7 +1,6 @@
 """The commands that order and show processes on all nodes: tessera down, status, restart and log."""
 
 import json
-import time
 from argparse import Namespace
 from typing import Any
 
@@ -27,9 +26,9 @@ def down(arguments: Namespace) -> int:
     # Each deputy first ends processes that none of its own depends on: the camera before the dispatcher.
     for deputy in deputies:
         sheriff.run(deputy, arguments.name, [], [], "")
-    until = time.monotonic() + arguments.timeout
+    until_s = sheriff.listened_s + arguments.timeout
     while left := _running(sheriff, arguments.name):
-        if time.monotonic() > until:
+        if sheriff.listened_s > until_s:
             raise RunError(f"still running after {arguments.timeout:g} s: {', '.join(left)}.")
         sheriff.listen(LISTEN_S)
     say(f"all processes of {arguments.name or ', '.join(deputies)} are stopped")
@@ -119,10 +118,10 @@ def restart(arguments: Namespace) -> int:
     deputy, process = sheriff.processes()[name]
     starts = process.num_starts
     sheriff.send(deputy, order)
-    until = time.monotonic() + arguments.timeout
+    until_s = sheriff.listened_s + arguments.timeout
     while process.num_starts == starts or process.state not in READY:
         process = sheriff.processes().get(name, (deputy, process))[1]
-        if time.monotonic() > until or process.state == procman_process_t.FAILED:
+        if sheriff.listened_s > until_s or process.state == procman_process_t.FAILED:
             state = STATE_NAMES.get(process.state, "?")
             raise RunError(f"{name} on {deputy} is {state}: {process.reason or 'no reason given'}.")
         sheriff.listen(LISTEN_S)
@@ -141,8 +140,8 @@ def log(arguments: Namespace) -> int:
     order = procman_order_t()
     order.action, order.process, order.num_lines = procman_order_t.TAIL, name, arguments.lines
     sent = sheriff.send(deputy, order)
-    until = time.monotonic() + TAIL_TIMEOUT_S
-    while not any(piece.order == sent and not piece.text for piece in pieces) and time.monotonic() < until:
+    until_s = sheriff.listened_s + TAIL_TIMEOUT_S
+    while not any(piece.order == sent and not piece.text for piece in pieces) and sheriff.listened_s < until_s:
         sheriff.listen(LISTEN_S)
     print("".join(piece.text for piece in pieces if piece.order == sent), end="", flush=True)
     while arguments.follow:

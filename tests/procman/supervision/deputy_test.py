@@ -9,6 +9,7 @@ import sys
 from argparse import Namespace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import lcm
 import pytest
@@ -18,6 +19,7 @@ from helpers.nodes import MakeNode
 from helpers.orders import KEY, bad_order
 from helpers.stack import environment, read_line, wait_for
 from tessera_cli.cluster.keys import KeyRing, to_text
+from tessera_cli.constants import LISTEN_S, LONGEST_TURN_S
 from tessera_cli.errors import RunError
 from tessera_cli.lcm_bus import bus_url
 from tessera_cli.messages import procman_order_t, procman_status_t
@@ -192,6 +194,19 @@ def test_a_setting_with_a_nul_is_refused_and_the_deputy_lives_on(make_node: Make
     with pytest.raises(RunError, match=r"node1 refuses: the setting camera.source=a\\x00b holds a control character"):
         sheriff.run("node1", "list", processes, ["camera.source=a\0b"], "a session")
     assert node.processes() == {}
+
+
+def test_time_in_which_a_sheriff_was_suspended_is_no_silence_of_deputies(
+    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moments = iter([100.0, 100.0 + LISTEN_S, 200.0, 3800.0])  # before and after each listening
+    sheriff = Sheriff(Namespace(port=make_node(COMMANDS).port, lan=False))
+    monkeypatch.setattr("tessera_cli.supervision.sheriff.listen", lambda *_: None)
+    monkeypatch.setattr("tessera_cli.supervision.sheriff.time", SimpleNamespace(monotonic=lambda: next(moments)))
+    sheriff.listen(LISTEN_S)
+    assert sheriff.listened_s == pytest.approx(LISTEN_S)
+    sheriff.listen(LISTEN_S)
+    assert sheriff.listened_s == pytest.approx(2 * LISTEN_S + LONGEST_TURN_S)
 
 
 @pytest.mark.parametrize(
