@@ -135,8 +135,12 @@ def test_a_status_makes_ready_and_silence_is_a_hang(make_deputy: MakeDeputy) -> 
         process("sleeper", "last", depends=("stage",)),
     )
     assert deputy.not_ready == ["stage", "last"]
-    deputy.on_stage_reports([report(deputy, "stage", RUNNING)])
-    step_until(deputy, lambda: not deputy.not_ready, "the one that depends on it")
+
+    def is_all_ready() -> bool:
+        deputy.on_stage_reports([report(deputy, "stage", RUNNING)])  # as long as the other one takes
+        return not deputy.not_ready
+
+    step_until(deputy, is_all_ready, "the one that depends on it")
     step_until(deputy, lambda: deputy.warnings, "the hang")
     assert deputy.warnings == ["stage sent no status for 0.3 s and was restarted."]
 
