@@ -107,6 +107,13 @@ class Sheriff:
         listen([self._bus, *self._other_buses], seconds)
         self.listened_s += min(time.monotonic() - began, seconds + LONGEST_TURN_S)
 
+    def listen_until(self, is_met: Callable[[], bool], seconds: float) -> bool:
+        """Whether it was met within so many seconds of listening."""
+        until_s = self.listened_s + seconds
+        while not (met := is_met()) and self.listened_s <= until_s:
+            self.listen(LISTEN_S)
+        return met
+
     def discover_deputies(self) -> None:
         """Returns when every deputy was heard once. Raises RunError if there is none."""
         self.listen(DISCOVERY_S)
@@ -129,16 +136,15 @@ class Sheriff:
 
     def require_deputies(self, ids: list[str]) -> None:
         """Waits for them. Raises UserError that names those that do not answer."""
-        until_s = self.listened_s + FIND_DEPUTY_TIMEOUT_S
-        while missing := [name for name in ids if name not in self.deputies]:
-            if self.listened_s > until_s:
-                if any(name in self._words.unknown for name in missing):
-                    raise UserError(f"{self._unknown_hint()}.")
-                raise UserError(
-                    f"no deputy answers for {', '.join(missing)}; known: {', '.join(self.deputies) or 'none'}. "
-                    f"Start it there: procman/tessera deputy --id {missing[0]}{self._lan_hint()}"
-                )
-            self.listen(LISTEN_S)
+        if self.listen_until(lambda: self.deputies.keys() >= set(ids), FIND_DEPUTY_TIMEOUT_S):
+            return
+        missing = [name for name in ids if name not in self.deputies]
+        if any(name in self._words.unknown for name in missing):
+            raise UserError(f"{self._unknown_hint()}.")
+        raise UserError(
+            f"no deputy answers for {', '.join(missing)}; known: {', '.join(self.deputies) or 'none'}. "
+            f"Start it there: procman/tessera deputy --id {missing[0]}{self._lan_hint()}"
+        )
 
     def run(
         self,

@@ -26,11 +26,9 @@ def down(arguments: Namespace) -> int:
     # Each deputy first ends processes that none of its own depends on: the camera before the dispatcher.
     for deputy in deputies:
         sheriff.run(deputy, arguments.name, [], [], "")
-    until_s = sheriff.listened_s + arguments.timeout
-    while left := _running(sheriff, arguments.name):
-        if sheriff.listened_s > until_s:
-            raise RunError(f"still running after {arguments.timeout:g} s: {', '.join(left)}.")
-        sheriff.listen(LISTEN_S)
+    if not sheriff.listen_until(lambda: not _running(sheriff, arguments.name), arguments.timeout):
+        left = ", ".join(_running(sheriff, arguments.name))
+        raise RunError(f"still running after {arguments.timeout:g} s: {left}.")
     say(f"all processes of {arguments.name or ', '.join(deputies)} are stopped")
     return 0
 
@@ -118,13 +116,15 @@ def restart(arguments: Namespace) -> int:
     deputy, process = sheriff.processes()[name]
     starts = process.num_starts
     sheriff.send(deputy, order)
-    until_s = sheriff.listened_s + arguments.timeout
-    while process.num_starts == starts or process.state not in READY:
+
+    def is_decided() -> bool:
+        nonlocal process
         process = sheriff.processes().get(name, (deputy, process))[1]
-        if sheriff.listened_s > until_s or process.state == procman_process_t.FAILED:
-            state = STATE_NAMES.get(process.state, "?")
-            raise RunError(f"{name} on {deputy} is {state}: {process.reason or 'no reason given'}.")
-        sheriff.listen(LISTEN_S)
+        return process.state == procman_process_t.FAILED or (process.num_starts != starts and process.state in READY)
+
+    if not sheriff.listen_until(is_decided, arguments.timeout) or process.state == procman_process_t.FAILED:
+        state = STATE_NAMES.get(process.state, "?")
+        raise RunError(f"{name} on {deputy} is {state}: {process.reason or 'no reason given'}.")
     say(f"{name} on {deputy} is ready again")
     return 0
 
@@ -140,9 +140,8 @@ def log(arguments: Namespace) -> int:
     order = procman_order_t()
     order.action, order.process, order.num_lines = procman_order_t.TAIL, name, arguments.lines
     sent = sheriff.send(deputy, order)
-    until_s = sheriff.listened_s + TAIL_TIMEOUT_S
-    while not any(piece.order == sent and not piece.text for piece in pieces) and sheriff.listened_s < until_s:
-        sheriff.listen(LISTEN_S)
+    # The last piece is empty.
+    sheriff.listen_until(lambda: any(piece.order == sent and not piece.text for piece in pieces), TAIL_TIMEOUT_S)
     print("".join(piece.text for piece in pieces if piece.order == sent), end="", flush=True)
     while arguments.follow:
         pieces.clear()
