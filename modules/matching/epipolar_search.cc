@@ -25,6 +25,7 @@ Result<> EpipolarOptions::Check() const {
     return Failed("the least parallax of new points must be positive");
   if (max_hamming < 1 || max_hamming > 256)
     return Failed("the Hamming distance of new points must be between 1 and 256");
+  if (!(max_by_chance > 0.0)) return Failed("the number of matches by chance of new points must be positive");
   return {};
 }
 
@@ -57,62 +58,94 @@ EpipolarSearch::InverseDepths EpipolarSearch::Bounds(const PixelObservation& see
 
 std::optional<EpipolarSearch::Match> EpipolarSearch::Find(int32_t keypoint) const {
   const PixelObservation seen = SeenAt(first_, keypoint);
-  const std::optional<int32_t> other = BestOnLine(keypoint, seen, calibration_.Ray(seen.pixel_px));
-  if (!other) return std::nullopt;
-  const PixelObservation seen_in_second = SeenAt(second_, *other);
+  const std::optional<Segment> line = LineOf(seen);
+  if (!line) return std::nullopt;
+  const std::optional<Candidate> found = BestOnLine(keypoint, *line);
+  if (!found) return std::nullopt;
+  const PixelObservation seen_in_second = SeenAt(second_, found->keypoint);
   const std::optional<Eigen::Vector3d> point = Triangulate(seen, seen_in_second);
   if (!point || !IsConsistent(*point, seen, seen_in_second)) return std::nullopt;
-  return Match{*other, *point};
+  if (NumByChance(keypoint, *line, *found) > options_.max_by_chance) return std::nullopt;
+  return Match{found->keypoint, *point};
 }
 
 // A point at inverse depth w along the ray stands, up to scale, at R ray + w t in the second camera.
-std::optional<int32_t> EpipolarSearch::BestOnLine(int32_t keypoint, const PixelObservation& seen,
-                                                  const Eigen::Vector3d& ray) const {
+std::optional<EpipolarSearch::Segment> EpipolarSearch::LineOf(const PixelObservation& seen) const {
   const InverseDepths bounds = Bounds(seen);
-  const Eigen::Vector3d direction = rotation_ * ray;
+  const Eigen::Vector3d direction = rotation_ * calibration_.Ray(seen.pixel_px);
   const Eigen::Vector3d far = direction + bounds.low * second_from_first_.translation;
   Eigen::Vector3d near = direction + bounds.high * second_from_first_.translation;
   if (far.z() < 0.05) return std::nullopt;  // leaves at the side or the back
   if (near.z() < 0.05) {                    // cut where the ray passes the camera
     near = far + (near - far) * ((far.z() - 0.05) / (far.z() - near.z()));
   }
-  const Eigen::Vector2d a = calibration_.Project(far), b = calibration_.Project(near);
-  if (!IsInImage(calibration_, a)) return std::nullopt;
-  const Eigen::Vector2d along = b - a;
-  const double length = along.norm();
-  const Eigen::Vector2d unit = length > 1e-9 ? Eigen::Vector2d(along / length) : Eigen::Vector2d::UnitX();
+  Segment line{calibration_.Project(far), calibration_.Project(near), Eigen::Vector2d::UnitX(), 0.0};
+  if (options_.needs_far_end && !IsInImage(calibration_, line.begin)) return std::nullopt;
+  const Eigen::Vector2d along = line.end - line.begin;
+  line.length_px = along.norm();
+  if (line.length_px > 1e-9) line.direction = along / line.length_px;
+  return line;
+}
 
+bool EpipolarSearch::Segment::IsNear(float x_px, float y_px, double limit_px) const {
+  const double from_begin_x = static_cast<double>(x_px) - begin.x();
+  const double from_begin_y = static_cast<double>(y_px) - begin.y();
+  const double along_px = direction.x() * from_begin_x + direction.y() * from_begin_y;
+  const double aside_px = direction.x() * from_begin_y - direction.y() * from_begin_x;
+  // One branch for the caller, nearly always the same: by turns, each condition would be guessed wrong for many.
+  bool is_near = std::abs(aside_px) <= limit_px;
+  is_near &= along_px >= -limit_px;
+  is_near &= along_px <= length_px + limit_px;
+  return is_near;
+}
+
+PatchRange EpipolarSearch::PatchesLike(const Keypoint& keypoint) const {
+  return PatchRange::Levels(keypoint.level - 2, keypoint.level + 2).WithAnglesNear(keypoint.angle + roll_);
+}
+
+std::optional<EpipolarSearch::Candidate> EpipolarSearch::BestOnLine(int32_t keypoint, const Segment& line) const {
   const Keypoint& from = first_.keypoints[Index(keypoint)];
   const Descriptor& descriptor = first_.descriptors[Index(keypoint)];
-  int best_distance = options_.max_hamming + 1, second_distance = 257;
-  int32_t best = -1;
+  Candidate best{-1, options_.max_hamming + 1, 0};
+  int second_distance = 257;
   Eigen::Vector2d best_px = Eigen::Vector2d::Zero();
   const double margin_px = limits_px_[static_cast<size_t>(std::min(kTopLevel, from.level + 2))];
-  const PatchRange range = PatchRange::Levels(from.level - 2, from.level + 2).WithAnglesNear(from.angle + roll_);
-  grid_.VisitSegment(a, b, margin_px, range, [&](const PlacedKeypoint& to) {
-    const double x_px = static_cast<double>(to.x_px) - a.x(), y_px = static_cast<double>(to.y_px) - a.y();
+  grid_.VisitSegment(line.begin, line.end, margin_px, PatchesLike(from), [&](const PlacedKeypoint& to) {
     const double limit = limits_px_[std::min<size_t>(to.level, kMaxLevels - 1)];
-    const double along_px = unit.x() * x_px + unit.y() * y_px, aside_px = unit.x() * y_px - unit.y() * x_px;
-    // One branch, nearly always the same: by turns, each condition would be guessed wrong for many.
-    bool is_near = std::abs(aside_px) <= limit;
-    is_near &= along_px >= -limit;
-    is_near &= along_px <= length + limit;
-    if (!is_near || !is_free_(to.index)) return;
+    if (!line.IsNear(to.x_px, to.y_px, limit) || !is_free_(to.index)) return;
+    ++best.num_on_line;
     const int distance = HammingDistance(descriptor, second_.descriptors[Index(to.index)]);
     const Eigen::Vector2d to_px(to.x_px, to.y_px);
     // The same corner found on another level is not a second candidate.
-    const auto is_elsewhere = [&] { return best < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level); };
-    if (distance < best_distance) {
-      if (best >= 0 && is_elsewhere()) second_distance = best_distance;
-      best_distance = distance;
-      best = to.index;
+    const auto is_elsewhere = [&] {
+      return best.keypoint < 0 || (to_px - best_px).norm() > 4.0 * LevelScale(to.level);
+    };
+    if (distance < best.distance) {
+      if (best.keypoint >= 0 && is_elsewhere()) second_distance = best.distance;
+      best.distance = distance;
+      best.keypoint = to.index;
       best_px = to_px;
     } else if (distance < second_distance && is_elsewhere()) {
       second_distance = distance;
     }
   });
-  if (best < 0 || best_distance > options_.max_hamming_ratio * second_distance) return std::nullopt;
+  if (best.keypoint < 0 || best.distance > options_.max_hamming_ratio * second_distance) return std::nullopt;
   return best;
+}
+
+// n (k + 0.2) / (N + 10), see the class: if nothing is elsewhere, one of fifty on the line would agree by chance.
+double EpipolarSearch::NumByChance(int32_t keypoint, const Segment& line, const Candidate& found) const {
+  const Keypoint& from = first_.keypoints[Index(keypoint)];
+  const Descriptor& descriptor = first_.descriptors[Index(keypoint)];
+  // Well away from the line: the point itself may be seen beside it, if the poses are wrong.
+  const double margin_px = 3.0 * limits_px_[static_cast<size_t>(std::min(kTopLevel, from.level + 2))];
+  int num_elsewhere = 0, num_alike = 0;
+  grid_.VisitAll(PatchesLike(from), [&](const PlacedKeypoint& to) {
+    if (line.IsNear(to.x_px, to.y_px, margin_px)) return;
+    ++num_elsewhere;
+    num_alike += HammingDistance(descriptor, second_.descriptors[Index(to.index)]) <= found.distance ? 1 : 0;
+  });
+  return found.num_on_line * (num_alike + 0.2) / (num_elsewhere + 10.0);
 }
 
 // From the two rays where they have parallax, from the disparity of one of them where that has more.

@@ -28,6 +28,9 @@ struct EpipolarOptions {
   double min_parallax_per_turn = 0.2;
   int max_hamming = 50;             // bits of 256: what patches of one point differ by, nearly always
   double max_hamming_ratio = 0.85;  // best match to the second best along the line, elsewhere on it
+  // How many keypoints on the line may be expected to look as much like the first by chance, by how many do elsewhere.
+  double max_by_chance = 0.1;
+  bool needs_far_end = true;  // no pair where a point at infinity would lie beside the second image; see below
 
   // Fails if a value is out of range.
   Result<> Check() const;
@@ -37,9 +40,18 @@ struct EpipolarOptions {
 // descriptor, orientation and level, and its point must lie in front of both cameras, project to both keypoints
 // (chi-square), and have distances that fit the levels.
 //
-// The segment's far end must lie in the second image. Where it lies beside it, a far point has no true match: what is
-// found for it is false, and always too near. In an open bend, where skylines turn into view and all look alike, most
-// pairs were such ones, and the scale followed them.
+// What agrees may do so by chance, the more easily the more there is on the line and the more the image repeats itself:
+// treetops, leaves, windows. Keypoints away from the line can't show the point, so they tell what chance does with this
+// descriptor, in this image. If n keypoints on the line were looked at, and k of N elsewhere are as near as the match,
+//
+//   n (k + 0.2) / (N + 10)
+//
+// others would be found by chance: the number of false alarms (Desolneux, Moisan, Morel, "Meaningful Alignments", IJCV
+// 2000). A fixed distance means another thing for each keypoint; stages/mapper/README.md has figures for both.
+//
+// Where the segment's far end lies beside the second image, a far point has no true match: what is found for it is
+// false, and always too near. In an open bend, where skylines turn into view, most pairs were such ones, and the scale
+// followed them. In a street, near walls stand there, and two pairs of three are true: so it can be switched off.
 class EpipolarSearch {
  public:
   // The features must outlive the search. `is_free` says which keypoints of the second view take part; one that a
@@ -59,8 +71,25 @@ class EpipolarSearch {
     double low;
     double high;
   };
+  // A piece of an epipolar line in the second image, pixels.
+  struct Segment {
+    Eigen::Vector2d begin;
+    Eigen::Vector2d end;
+    Eigen::Vector2d direction;  // of length 1
+    double length_px;
+    // Whether the position is at most `limit_px` beside the segment and beyond its ends.
+    bool IsNear(float x_px, float y_px, double limit_px) const;
+  };
+  struct Candidate {
+    int32_t keypoint = -1;
+    int distance = 257;  // bits
+    int num_on_line = 0;
+  };
   InverseDepths Bounds(const PixelObservation& seen) const;
-  std::optional<int32_t> BestOnLine(int32_t keypoint, const PixelObservation& seen, const Eigen::Vector3d& ray) const;
+  std::optional<Segment> LineOf(const PixelObservation& seen) const;
+  PatchRange PatchesLike(const Keypoint& keypoint) const;
+  std::optional<Candidate> BestOnLine(int32_t keypoint, const Segment& line) const;
+  double NumByChance(int32_t keypoint, const Segment& line, const Candidate& found) const;
   std::optional<Eigen::Vector3d> Triangulate(const PixelObservation& in_first, const PixelObservation& in_second) const;
   std::optional<Eigen::Vector3d> FarPoint(const Eigen::Vector3d& ray, const Eigen::Vector3d& ray_in_second,
                                           double noise_rad) const;

@@ -84,6 +84,12 @@ class FeatureGrid {
     }
   }
 
+  // Calls visit(placed) for each keypoint in the range.
+  template <class Visit>
+  void VisitAll(const PatchRange& range, Visit visit) const {
+    VisitCells(0U, begin_.back(), range, visit);
+  }
+
  private:
   static constexpr double kCellPx = 16.0;  // a few keypoints a cell at 2000 per image
   static constexpr uint32_t kLanes = 32;   // of a vector

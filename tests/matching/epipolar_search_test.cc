@@ -67,9 +67,42 @@ TEST_F(EpipolarPairs, AreNotLookedForWhereAFarPointHasNone) {
     EXPECT_TRUE(is_inside || !is_found) << "keypoint " << i;
   }
   EXPECT_GT(num_inside, 50);
+
+  const EpipolarOptions anywhere{.min_parallax_per_turn = 0.0, .needs_far_end = false};
+  const EpipolarSearch trusting(now.features, first_.features, before_from_now, AnyKeypoint, 1.0, anywhere);
+  int num_found = 0;
+  for (size_t i = 0; i < now.points.size(); ++i) num_found += trusting.Find(static_cast<int32_t>(i)) ? 1 : 0;
+  EXPECT_GT(num_found, num_inside);
+}
+
+// A pair that agrees no better than keypoints far from its line do is one by chance.
+TEST_F(EpipolarPairs, AreNotMadeOfWhatLooksAlikeEverywhere) {
+  SyntheticWorld::Picture repeated = second_;
+  const auto num_found = [&](const FeatureFrame& second) {
+    const EpipolarSearch search(first_.features, second, second_from_first_, AnyKeypoint, 1.0, options_);
+    int num = 0;
+    for (size_t i = 0; i < first_.points.size(); ++i) num += search.Find(static_cast<int32_t>(i)) ? 1 : 0;
+    return num;
+  };
+  const int num_without = num_found(second_.features);
+  // What each point looks like is seen in forty other places too.
+  const auto num_keypoints = static_cast<int32_t>(repeated.points.size());
+  for (int32_t i = 0; i < num_keypoints; ++i) {
+    for (int32_t k = 1; k <= 40; ++k) {
+      Keypoint copy = second_.features.keypoints[Index((i + k * num_keypoints / 41) % num_keypoints)];
+      const Keypoint& original = second_.features.keypoints[Index(i)];
+      copy.level = original.level;
+      copy.angle = original.angle;
+      repeated.features.keypoints.push_back(copy);
+      repeated.features.descriptors.push_back(second_.features.descriptors[Index(i)]);
+    }
+  }
+  EXPECT_GT(num_without, 200);
+  EXPECT_LT(num_found(repeated.features), num_without / 4);
 }
 
 TEST(EpipolarOptions, OutOfRangeIsRefused) {
+  EXPECT_THAT(EpipolarOptions{.max_by_chance = 0.0}.Check(), IsFailure(HasSubstr("by chance")));
   EXPECT_THAT(EpipolarOptions{}.Check(), IsSuccess());
   EXPECT_THAT(EpipolarOptions{.min_parallax_sigmas = 0.0}.Check(), IsFailure(HasSubstr("parallax")));
   EXPECT_THAT(EpipolarOptions{.max_hamming = 0}.Check(), IsFailure(HasSubstr("256")));
