@@ -15,6 +15,7 @@ struct LocalWindowOptions {
   // Outer poses move too, constrained by their poses relative to their neighbors, and see no points (the double
   // window of Strasdat et al. 2011); else they stay, and see the window's points. stages/mapper/README.md has figures.
   bool is_double = false;
+  size_t num_confirming = 4;  // landmarks that fewer keyframes observe follow the poses and don't move them
 
   Result<> Check() const;
 };

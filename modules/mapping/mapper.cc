@@ -57,6 +57,8 @@ Result<> MapperOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(window.Check());
   TESSERA_RETURN_IF_FAILED(bundle.Check());
   TESSERA_RETURN_IF_FAILED(landmark_culling.Check());
+  if (num_cautious_keyframes < 0)
+    return Failed("the number of keyframes that are mapped with caution can't be negative");
   return keyframe_culling.Check();
 }
 
@@ -75,8 +77,8 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   recent_landmarks_.Cull(seen.id, options_.landmark_culling, editor);
   const std::vector<LandmarkId> from_pairs = CreateLandmarks(seen.id, editor);
   FuseLandmarks(seen.id, options_.fusion, editor);
-  RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
-  AdjustLocally(seen.id, options_.window, options_.bundle, motions_, editor);
+  if (IsCautious(seen.id)) RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
+  AdjustLocally(seen.id, Window(seen.id), options_.bundle, motions_, editor);
   CullKeyframes(seen.id, options_.keyframe_culling, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
@@ -117,7 +119,7 @@ bool Mapper::ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now,
       continue;
     }
     CloseLoop(loop, options_.loop_fusion, editor);
-    AdjustLocally(loop.answers, options_.window, options_.bundle, motions_, editor);
+    AdjustLocally(loop.answers, Window(now), options_.bundle, motions_, editor);
     last_corrected_ = now;
     wants_adjustment_ = is_base_outdated_ = has_moved = true;
   }
@@ -158,7 +160,17 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
 }
 
 void Mapper::RememberMotion(const KeyframeObservation& seen) {
-  if (seen.expected.is_known()) motions_[seen.id] = {seen.reference, seen.expected};
+  if (!seen.expected.is_known()) return;
+  motions_[seen.id] = {seen.reference, seen.expected};
+  cautious_until_ = {seen.id.value + options_.num_cautious_keyframes};
+}
+
+// Without caution, the pair that made a landmark is enough for it to move poses.
+LocalWindowOptions Mapper::Window(KeyframeId now) const {
+  constexpr size_t kPair = 2;
+  LocalWindowOptions window = options_.window;
+  if (!IsCautious(now)) window.num_confirming = kPair;
+  return window;
 }
 
 void Mapper::ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor) {
@@ -200,7 +212,9 @@ void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
 }
 
 std::vector<LandmarkId> Mapper::CreateLandmarks(KeyframeId id, MapEditor& editor) {
-  std::vector<LandmarkId> from_pairs = CreateFromPairs(id, options_.creation, editor);
+  CreationOptions creation = options_.creation;
+  creation.matching.needs_far_end = IsCautious(id);
+  std::vector<LandmarkId> from_pairs = CreateFromPairs(id, creation, editor);
   recent_landmarks_.Add(id, from_pairs);
   recent_landmarks_.Add(id, CreateFromDepth(id, options_.creation, editor));
   return from_pairs;

@@ -30,12 +30,20 @@ struct MapperOptions {
   LandmarkCullingOptions landmark_culling;
   KeyframeCullingOptions keyframe_culling;
   LoopFusionOptions loop_fusion;
+  // How many keyframes are mapped with caution after one whose way the images leave open (Mapper).
+  int num_cautious_keyframes = 25;
   bool polishes = false;  // Finish() asks for a last global adjustment, of every part of the map, also without loops
 
   // Fails if a value is out of range.
   Result<> Check() const;
 };
 
+// Where the images leave the way of the camera open, points that only look alike decide it. A keyframe that brings an
+// expected motion says so; from there on, for a while,
+// - no keypoint is paired with a keyframe in which a far point of its ray would lie beside the image,
+// - new landmarks stay only if keyframes other than the pair that made them confirm them,
+// - landmarks of few observers don't move poses.
+// Elsewhere these rules would cost more true landmarks than false ones, half of all in a street.
 class Mapper {
  public:
   // Throws std::invalid_argument with Check()'s sentence.
@@ -65,6 +73,8 @@ class Mapper {
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void RememberMotion(const KeyframeObservation& seen);
+  bool IsCautious(KeyframeId now) const { return cautious_until_.valid() && now <= cautious_until_; }
+  LocalWindowOptions Window(KeyframeId now) const;
   void ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor);
   void ObserveShared(const KeyframeObservation& seen, MapEditor& editor);
   // Returns those created from pairs of keyframes.
@@ -72,7 +82,8 @@ class Mapper {
 
   const MapperOptions options_;
   Map map_;
-  KeyframeMotions motions_;  // of keyframes in the map
+  KeyframeMotions motions_;    // of keyframes in the map
+  KeyframeId cautious_until_;  // the last keyframe to be mapped with caution, if no other asks for it
   RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;
   KeyframeId last_corrected_;           // the delta that answers it corrected the map

@@ -74,7 +74,7 @@ struct KeyframeObservation {
   std::vector<LandmarkId> landmarks;   // by keypoint: the landmark it saw; invalid: none
   KeyframeId reference;                // the keyframe that the estimate is relative to; invalid: a new part begins
   Rigid3 reference_from_camera;        // as in PoseEstimate
-  MotionPrior expected;                // by how the camera moved when `reference` was made
+  MotionPrior expected;                // by how the camera moved when `reference` was made; where images leave it open
   std::vector<SharedKeypoint> shared;  // points without an id yet: mono's first ones, or from depth
   int64_t num_deltas = 0;              // as in PoseEstimate
 };

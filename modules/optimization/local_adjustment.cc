@@ -9,7 +9,6 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kConfirmingObservers = 4;
 constexpr size_t kMinConfirmed = 50;  // landmarks of a window
 constexpr double kNoInformation = 1e-6;
 
@@ -119,18 +118,18 @@ int ScalePose(const BundleProblem& problem) {
   return best;
 }
 
-bool IsConfirmed(const Map& map, LandmarkId id) {
+bool IsConfirmed(const Map& map, LandmarkId id, size_t num_confirming) {
   const std::span<const Observation> observations = map.ObservationsOf(id);
-  return observations.size() >= kConfirmingObservers ||
+  return observations.size() >= num_confirming ||
          std::any_of(observations.begin(), observations.end(), [&](const Observation& seen) {
            return SeenAt(*map.FindKeyframe(seen.keyframe)->features, seen.keypoint).has_right();
          });
 }
 
 // Takes the landmarks out that are not confirmed, unless too few would be left.
-std::vector<LandmarkId> TakeUnconfirmed(const Map& map, std::vector<LandmarkId>& landmarks) {
+std::vector<LandmarkId> TakeUnconfirmed(const Map& map, size_t num_confirming, std::vector<LandmarkId>& landmarks) {
   std::vector<LandmarkId> confirmed, unconfirmed;
-  for (const LandmarkId id : landmarks) (IsConfirmed(map, id) ? confirmed : unconfirmed).push_back(id);
+  for (const LandmarkId id : landmarks) (IsConfirmed(map, id, num_confirming) ? confirmed : unconfirmed).push_back(id);
   if (confirmed.size() < kMinConfirmed) return {};
   landmarks = std::move(confirmed);
   return unconfirmed;
@@ -207,7 +206,7 @@ void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, 
                    const KeyframeMotions& motions, MapEditor& editor) {
   const Map& map = editor.map();
   LocalWindow window = SelectLocalWindow(map, center, window_options);
-  const std::vector<LandmarkId> unconfirmed = TakeUnconfirmed(map, window.landmarks);
+  const std::vector<LandmarkId> unconfirmed = TakeUnconfirmed(map, window_options.num_confirming, window.landmarks);
   if (window.landmarks.empty()) return;
   const BundleProblem problem = BuildLocalProblem(map, window, window_options, motions);
   if (const std::optional<BundleResult> result = AdjustBundle(problem, bundle_options)) {

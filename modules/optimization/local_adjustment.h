@@ -37,8 +37,8 @@ void WriteBack(const BundleProblem& problem, const BundleResult& result, MapEdit
 
 // Selects the window around `center`, optimizes it and writes the result back. Does nothing where there is nothing to
 // optimize. Two rays meet somewhere whatever they show, also where keypoints only look alike: landmarks that fewer than
-// kConfirmingObservers keyframes see, and none with depth, follow the poses and don't move them, unless there are too
-// few others.
+// `num_confirming` keyframes see, and none with depth, follow the poses and don't move them, unless there are too few
+// others.
 void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, const BundleOptions& bundle_options,
                    const KeyframeMotions& motions, MapEditor& editor);
 

@@ -19,6 +19,7 @@ constexpr double kMinShareWithMotion = 0.5;
 constexpr double kDriftInterval_s = 0.1;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
+constexpr double kOpenShare = 0.01;      // of a way from keyframe to keyframe: see IsWayOpen()
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
@@ -534,6 +535,14 @@ MotionPrior MapTracker::ExpectFrom(KeyframeId reference, const Rigid3& reference
   return {motion->last_from_current.translation, 0.5 * (information + information.transpose())};
 }
 
+// Whether the images leave the length of the way from the reference keyframe open by more than kOpenShare of it.
+bool MapTracker::IsWayOpen(const TrackedFrame& frame, const Rigid3& reference_from_camera) const {
+  if (!last_ || &last_->frame != &frame) return true;
+  const Eigen::Vector3d way_in_camera = reference_from_camera.rotation.conjugate() * reference_from_camera.translation;
+  const double variance = way_in_camera.dot(last_->covariance * way_in_camera);  // of the length, times length^2
+  return std::sqrt(variance) > kOpenShare * way_in_camera.squaredNorm();
+}
+
 // Of a frame that becomes the reference; nullopt: nothing is known of its error. Points of the first one with depth
 // stand where it sees them. What two frames have from points that both see cancels between them, if the points err each
 // by itself: those of mono were triangulated by a few keyframes and move with these all together, which residuals don't
@@ -554,7 +563,9 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   keyframe.world_from_camera = frame.world_from_camera;
   keyframe.reference = reference;
   keyframe.reference_from_camera = reference_from_camera;
-  keyframe.expected = ExpectFrom(reference, reference_from_camera, keyframe.features.utime_us);
+  if (IsWayOpen(frame, reference_from_camera)) {
+    keyframe.expected = ExpectFrom(reference, reference_from_camera, keyframe.features.utime_us);
+  }
   motion_at_reference_ = MotionAt{motion_, keyframe.features.utime_us};
   keyframe.landmarks.resize(frame.points.size());
   for (size_t i = 0; i < frame.points.size(); ++i) {

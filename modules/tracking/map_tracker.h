@@ -133,6 +133,7 @@ class MapTracker {
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
   std::optional<PosePrior> PriorOf(const MotionPrediction& motion) const;
+  bool IsWayOpen(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
   MotionPrior ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const;
   void ResetMotion();
   std::optional<Drift> DriftNow() const;

@@ -106,6 +106,28 @@ TEST(Mapper, MonoCorrectsPosesAndFindsTheOtherPoints) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 5e-3);
 }
 
+// Where poses are off by more than fusion looks around (3 px), nobody confirms a new point: it stays where the images
+// fix the way, and goes while the way is open.
+TEST(Mapper, NewPointsNeedToBeConfirmedWhereTheWayIsOpen) {
+  SyntheticWorld world(SensorType::kMono, 0.0);
+  Drive drive(world, 0.04, 3);
+  Mapper mapper({.num_cautious_keyframes = 2});
+  std::vector<size_t> num_new;  // by step: landmarks that only the pair observes that made them
+  for (int64_t step = 0; step < 10; ++step) {
+    KeyframeObservation seen = drive.Next(step);
+    if (step == 4) seen.expected = {seen.reference_from_camera.translation, 1e-6 * Eigen::Matrix3d::Identity()};
+    mapper.Process(seen);
+    num_new.push_back(0);
+    mapper.map().landmarks().ForEach([&](LandmarkId id, const Landmark&) {
+      const std::span<const Observation> observations = mapper.map().ObservationsOf(id);
+      const bool is_pair = observations.size() == 2 && observations.back().keyframe == seen.id;
+      num_new.back() += is_pair ? 1 : 0;
+    });
+  }
+  for (const size_t step : {4U, 5U, 6U}) EXPECT_LT(num_new[step], 20U) << step;
+  for (const size_t step : {3U, 7U, 8U, 9U}) EXPECT_GT(num_new[step], 30U) << step;
+}
+
 TEST(Mapper, StereoBuildsAMapFromDepthUnderNoise) {
   SyntheticWorld world(SensorType::kStereo, 0.5);
   Drive drive(world, 0.02, 2);
