@@ -25,7 +25,7 @@ MAX_MESSAGES_PER_TURN = 200
 
 # --- Channels (lcmtypes/README.md) --------------------------------------------------------------------------------
 STATUS, POSE, HEARTBEAT, CAMERA, END_OF_STREAM = "STATUS", "POSE", "HEARTBEAT", "CAMERA", "END_OF_STREAM"
-REPAIR = "REPAIR"
+REPAIR, COLOR = "REPAIR", "COLOR"
 PROCMAN_ORDER, PROCMAN_STATUS, PROCMAN_OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
 
 # --- Limits -------------------------------------------------------------------------------------------------------
