@@ -10,9 +10,9 @@ def urls(on_lan: bool) -> dict[str, str]:
 
 def test_nothing_leaves_one_machine() -> None:
     found = urls(on_lan=False)
-    assert set(found) == {"bus.main_url", "bus.camera_url", "bus.work_url", "bus.map_url"}
+    assert set(found) == {"bus.main_url", "bus.camera_url", "bus.color_url", "bus.work_url", "bus.map_url"}
     assert all(url.endswith("?ttl=0") for url in found.values())
-    assert len(set(found.values())) == 4
+    assert len(set(found.values())) == 5
 
 
 def test_what_is_large_has_groups_of_its_own_on_a_lan() -> None:
