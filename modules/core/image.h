@@ -39,7 +39,16 @@ struct Image {
   bool operator==(const Image&) const = default;
 };
 
-using GrayImage = Image<uint8_t>;    // intensity 0..255
+struct Rgb {
+  uint8_t red = 0;  // sRGB, 0..255
+  uint8_t green = 0;
+  uint8_t blue = 0;
+
+  bool operator==(const Rgb&) const = default;
+};
+
+using GrayImage = Image<uint8_t>;  // intensity 0..255
+using ColorImage = Image<Rgb>;
 using DepthImage = Image<uint16_t>;  // counts of `CameraCalibration::depth_unit_m`; 0: unknown
 
 // The pixels of `rect`, which must lie inside the image.

@@ -16,10 +16,21 @@ PacerOptions PaceOf(const FrameSource& source, const CameraSessionOptions& optio
   return pace;
 }
 
+// A file that became unreadable is told when it is read as a frame.
+ColorImage ReadOrNone(const ColorReader& read) {
+  try {
+    return read ? read() : ColorImage();
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us)
-    : source_(std::move(source)),
+    : is_followed_(options.is_followed),
+      with_color_(options.with_color),
+      source_(std::move(source)),
       pacer_(PaceOf(*source_, options)),
       renumbering_(options.num_on_the_way),
       last_progress_us_(now_us) {}
@@ -34,9 +45,17 @@ Result<> CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now
     tracked_ = frame;
     tracked_utime_us_ = utime_us;
   }
+  colors_.erase(colors_.begin(), colors_.lower_bound(frame));
   pacer_.MarkTracked(frame);
   last_progress_us_ = now_us;
   return {};
+}
+
+CameraActions CameraSession::TellColor(FrameId frame, int64_t utime_us) {
+  if (!with_color_) return {};
+  const auto found = colors_.find(frame);
+  return {ColorFrame{
+      .id = frame, .utime_us = utime_us, .image = found == colors_.end() ? ColorImage() : ReadOrNone(found->second)}};
 }
 
 CameraSession::State CameraSession::Look(int64_t now_us) {
@@ -89,6 +108,7 @@ CameraActions CameraSession::Read() {
   }
   is_exhausted_ = !next_;
   if (next_) renumbering_.Apply(*next_);
+  if (next_ && with_color_) next_color_ = source_->TakeColor();
   return {};
 }
 
@@ -100,8 +120,21 @@ CameraActions CameraSession::Send(int64_t now_us) {
   last_progress_us_ = now_us;
   ++num_sent_;
   CameraActions actions = TruthsUpTo(last_sent_);
+  KeepColor(actions);
   actions.emplace_back(*std::exchange(next_, std::nullopt));
   return actions;
+}
+
+// Of the frame that is sent next.
+void CameraSession::KeepColor(CameraActions& actions) {
+  ColorReader color = std::exchange(next_color_, nullptr);
+  if (!color) return;
+  if (is_followed_) {
+    colors_[next_->id] = std::move(color);
+    if (colors_.size() > kMaxColors) colors_.erase(colors_.begin());
+  } else if (ColorImage image = ReadOrNone(color); !image.empty()) {
+    actions.emplace_back(ColorFrame{.id = next_->id, .utime_us = next_->utime_us, .image = std::move(image)});
+  }
 }
 
 CameraActions CameraSession::TruthsUpTo(FrameId frame) {

@@ -7,11 +7,15 @@
 //   kAtEnd     the source has no more frames: Advance() ends the stream
 //   kEnded     the stream has ended, or broke off at a damaged image and gets no end
 //
+// A frame that becomes a keyframe, as POSE tells, is sent once more in color, if that is wanted. Where nobody tells
+// which frames do, all of them are, each before its frame.
+//
 // A camera that was started again learns from POSE what is tracked, and continues behind it: what was on its way is
 // sent once more. A recorded source keeps its numbers; a live one gets higher ones (renumbering.h).
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,10 +35,11 @@ struct CameraSessionOptions {
   PacerOptions pace;           // of a source that can be delayed
   bool is_followed = true;     // false: nobody tracks the frames and answers with poses, so nothing is waited for
   int64_t num_on_the_way = 0;  // frames that the dispatcher can have taken, beyond the last one tracked
+  bool with_color = false;
 };
 
 // Values are to be published.
-using CameraAction = std::variant<GroundTruthPose, CameraFrame, EndOfStream, Fail, Finish>;
+using CameraAction = std::variant<GroundTruthPose, ColorFrame, CameraFrame, EndOfStream, Fail, Finish>;
 using CameraActions = std::vector<CameraAction>;
 
 class CameraSession {
@@ -46,6 +51,9 @@ class CameraSession {
   const FrameSource& source() const { return *source_; }
   // This frame, taken at `utime_us`, and all before it, have a pose. Fails if it can't have been sent.
   Result<> MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
+  // What tells the color of this frame, which became a keyframe: an empty image if there is none, or if it was sent in
+  // an earlier life. Nothing if colors are not wanted.
+  CameraActions TellColor(FrameId frame, int64_t utime_us);
   std::vector<std::string> TakeEvents() { return source_->TakeEvents(); }
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
@@ -66,6 +74,8 @@ class CameraSession {
   static constexpr int64_t kLookAtLiveUs = 2'000;
   // Without a pose for this long, lockstep asks for help: the slowest pipeline tracks a frame in less.
   static constexpr int64_t kNoPoseUs = 10'000'000;
+  // Frames whose colors are kept until their poses come; of more, the oldest are dropped.
+  static constexpr size_t kMaxColors = 64;
   // No pipeline has so many frames in it.
   static constexpr int64_t kMaxFramesAhead = 10'000;
 
@@ -73,12 +83,17 @@ class CameraSession {
   void PassOverTracked();
   CameraActions Read();
   CameraActions Send(int64_t now_us);
+  void KeepColor(CameraActions& actions);
   CameraActions TruthsUpTo(FrameId frame);
 
+  const bool is_followed_;
+  const bool with_color_;
   std::unique_ptr<FrameSource> source_;
   Pacer pacer_;
-  Renumbering renumbering_;          // of a live source
-  std::optional<CameraFrame> next_;  // read and not yet sent
+  Renumbering renumbering_;                // of a live source
+  std::optional<CameraFrame> next_;        // read and not yet sent
+  ColorReader next_color_;                 // of next_
+  std::map<FrameId, ColorReader> colors_;  // of frames that were sent and have no pose yet
   bool is_exhausted_ = false;
   size_t num_truths_sent_ = 0;
   int64_t num_sent_ = 0;

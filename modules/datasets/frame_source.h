@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,7 +23,12 @@ struct SourceOptions {
   double depth_unit_m = 0.0;              // RGB-D: meters per count, instead of the source's; 0: the source's
   int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
   int64_t last_frame = -1;                // -1: to the end
+  bool with_color = false;                // TakeColor() is called
 };
+
+// Reads the color image of a frame when it is called, rectified as that frame is; empty if the image is gray. To be
+// called while its source lives. Throws InputError as FrameSource::Next().
+using ColorReader = std::function<ColorImage()>;
 
 class FrameSource {
  public:
@@ -36,6 +42,9 @@ class FrameSource {
   virtual const std::vector<GroundTruthPose>& ground_truth() const = 0;
   // The next frame; nullopt at the end. Throws InputError at an image that is damaged or of another size.
   virtual std::optional<CameraFrame> Next() = 0;
+  // Of the frame that Next() returned last; null if the source has no colors. To be called before the next Next(): most
+  // frames never become keyframes, so that no color is decoded on the way.
+  virtual ColorReader TakeColor() { return nullptr; }
   // Whether Next() has something to return, rather than to wait for.
   virtual bool HasNext() { return true; }
   // Frames below this number are no longer needed. A source that has to read them anyway returns them nonetheless.

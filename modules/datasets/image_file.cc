@@ -11,6 +11,7 @@
 
 #include "core/errors.h"
 #include "core/files.h"
+#include "datasets/color_pixels.h"
 #include "datasets/text_file.h"
 
 namespace tessera {
@@ -113,6 +114,11 @@ Image<Pixel> CopyPixels(const cv::Mat& mat) {
 }  // namespace
 
 GrayImage ReadGrayImage(const std::string& path) { return CopyPixels<uint8_t>(Decode(path, cv::IMREAD_GRAYSCALE)); }
+
+ColorImage ReadColorImage(const std::string& path) {
+  const cv::Mat image = Decode(path, cv::IMREAD_ANYCOLOR);
+  return image.type() == CV_8UC3 ? ColorsOf(image) : ColorImage();
+}
 
 DepthImage ReadDepthImage(const std::string& path) {
   const cv::Mat depth = Decode(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);

@@ -13,6 +13,9 @@ namespace tessera {
 // Throws InputError if the file is missing, truncated or not an image.
 GrayImage ReadGrayImage(const std::string& path);
 
+// The colors of an image file; empty if it is gray. Throws InputError as above.
+ColorImage ReadColorImage(const std::string& path);
+
 // The counts of a depth image file: one channel of 16 bits. Throws InputError as above.
 DepthImage ReadDepthImage(const std::string& path);
 

@@ -12,11 +12,24 @@ class ImageFiles : public ImageReader {
  public:
   explicit ImageFiles(std::vector<std::string> paths) : paths_(std::move(paths)) {}
   int64_t num_images() const override { return static_cast<int64_t>(paths_.size()); }
-  GrayImage Read(int64_t index) override { return ReadGrayImage(paths_.at(static_cast<size_t>(index))); }
+  GrayImage Read(int64_t index) override {
+    last_ = index;
+    return ReadGrayImage(paths_.at(static_cast<size_t>(index)));
+  }
+  ColorReader ColorOfLast() override {
+    if (!has_color_) return nullptr;
+    return [this, path = paths_.at(static_cast<size_t>(last_))] {
+      ColorImage color = ReadColorImage(path);
+      has_color_ = !color.empty();  // so are the others
+      return color;
+    };
+  }
   std::string Name(int64_t index) const override { return paths_.at(static_cast<size_t>(index)); }
 
  private:
   std::vector<std::string> paths_;
+  int64_t last_ = 0;
+  bool has_color_ = true;  // as far as is known
 };
 
 class VideoImages : public ImageReader {
@@ -42,6 +55,7 @@ class VideoImages : public ImageReader {
     ++next_;
     return std::move(*image);
   }
+  ColorReader ColorOfLast() override { return video_.ColorOfLast(); }
 
  private:
   [[noreturn]] void ComplainOfEnd() const {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "core/errors.h"
 #include "datasets/image_file.h"
@@ -17,6 +18,7 @@ class RecordedSource : public FrameSource {
   std::optional<int64_t> num_frames() const override { return end_ - first_; }
   const std::vector<GroundTruthPose>& ground_truth() const override { return ground_truth_; }
   std::optional<CameraFrame> Next() override;
+  ColorReader TakeColor() override { return std::exchange(color_, nullptr); }
   void SkipTo(FrameId frame) override { next_ = std::clamp(frame.value, next_, end_); }
   bool is_live() const override { return false; }
   const std::vector<std::string>& notes() const override { return recording_.notes; }
@@ -27,21 +29,24 @@ class RecordedSource : public FrameSource {
   void PrepareRectifier(const SourceOptions& options);
   void RectifyGroundTruth();
   GrayImage ReadLeft(int64_t index);
+  ColorReader ColorOfLeft(int64_t index);
   GrayImage ReadRight(int64_t index);
   DepthImage ReadDepth(int64_t index);
 
   Recording recording_;
   SensorType sensor_;
+  bool with_color_;
   int64_t first_ = 0;
   int64_t end_ = 0;
   int64_t next_ = 0;
   GrayImage first_left_;  // was read to learn its size
+  ColorReader color_;     // of the last frame
   std::unique_ptr<Rectifier> rectifier_;
   std::vector<GroundTruthPose> ground_truth_;
 };
 
 RecordedSource::RecordedSource(Recording recording, const SourceOptions& options)
-    : recording_(std::move(recording)), sensor_(options.sensor) {
+    : recording_(std::move(recording)), sensor_(options.sensor), with_color_(options.with_color) {
   ChooseFrames(options);
   CheckTimes();
   PrepareRectifier(options);
@@ -110,6 +115,19 @@ GrayImage RecordedSource::ReadLeft(int64_t index) {
   return rectifier_->Left(std::move(image));
 }
 
+// Of the left image that was read last, which has the number `index`.
+ColorReader RecordedSource::ColorOfLeft(int64_t index) {
+  ColorReader read = with_color_ ? recording_.left->ColorOfLast() : nullptr;
+  if (!read) return nullptr;
+  return [this, index, read = std::move(read)]() -> ColorImage {
+    ColorImage image = read();
+    if (image.empty()) return image;
+    RequireSize(image.width, image.height, calibration().width_px, calibration().height_px,
+                "image " + recording_.left->Name(index));
+    return rectifier_->LeftColor(std::move(image));
+  };
+}
+
 GrayImage RecordedSource::ReadRight(int64_t index) {
   GrayImage image = recording_.right->Read(index);
   RequireSize(image.width, image.height, calibration().width_px, calibration().height_px,
@@ -133,6 +151,7 @@ std::optional<CameraFrame> RecordedSource::Next() {
   frame.utime_us = recording_.utimes_us[static_cast<size_t>(next_)];
   frame.sensor = sensor_;
   frame.left = ReadLeft(next_);
+  color_ = ColorOfLeft(next_);
   if (sensor_ == SensorType::kStereo) {
     frame.right = ReadRight(next_);
   }

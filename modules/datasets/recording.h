@@ -20,6 +20,8 @@ class ImageReader {
   virtual int64_t num_images() const = 0;
   // Throws InputError if the image is missing or damaged.
   virtual GrayImage Read(int64_t index) = 0;
+  // The colors of the image that was read last, to be decoded later; null if they can't be.
+  virtual ColorReader ColorOfLast() = 0;
   // Its file, and its index there if the file holds several; for messages.
   virtual std::string Name(int64_t index) const = 0;
 };

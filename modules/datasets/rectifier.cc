@@ -182,6 +182,10 @@ GrayImage Rectifier::Left(GrayImage image) const {
   return maps_ ? maps_->left.Apply(image, CV_8UC1, cv::INTER_LINEAR) : std::move(image);
 }
 
+ColorImage Rectifier::LeftColor(ColorImage image) const {
+  return maps_ ? maps_->left.Apply(image, CV_8UC3, cv::INTER_LINEAR) : std::move(image);
+}
+
 GrayImage Rectifier::Right(GrayImage image) const {
   return maps_ ? maps_->right.Apply(image, CV_8UC1, cv::INTER_LINEAR) : std::move(image);
 }

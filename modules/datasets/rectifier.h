@@ -33,6 +33,7 @@ class Rectifier {
 
   // Images must have the rig's size.
   GrayImage Left(GrayImage image) const;
+  ColorImage LeftColor(ColorImage image) const;
   GrayImage Right(GrayImage image) const;
   DepthImage Depth(DepthImage image) const;
 

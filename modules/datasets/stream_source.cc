@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "core/errors.h"
 #include "datasets/calibration_file.h"
@@ -25,6 +26,7 @@ class StreamSource : public FrameSource {
   std::optional<int64_t> num_frames() const override;
   const std::vector<GroundTruthPose>& ground_truth() const override { return ground_truth_; }
   std::optional<CameraFrame> Next() override;
+  ColorReader TakeColor() override { return std::exchange(color_, nullptr); }
   bool is_live() const override { return is_live_; }
   const std::vector<std::string>& notes() const override { return notes_; }
 
@@ -32,23 +34,30 @@ class StreamSource : public FrameSource {
   void ChooseFrames(const SourceOptions& options);
   void NoteEarlyEnd();
   int64_t TimeOfLastImage();
+  ColorReader ColorOfLast() const;
 
   std::string name_;
   VideoInput video_;
   bool is_live_;
+  bool with_color_;
   double frames_per_s_;
   int64_t first_ = 0;
   int64_t end_ = -1;  // -1: until the stream ends
   int64_t next_ = 0;
   int64_t last_utime_us_ = -1;
-  std::optional<GrayImage> first_image_;  // was read to learn its size
-  std::unique_ptr<Rectifier> rectifier_;
+  std::optional<GrayImage> first_image_;       // was read to learn its size
+  ColorReader color_;                          // of the last frame
+  std::shared_ptr<Rectifier> rectifier_;       // color_ has it too
   std::vector<GroundTruthPose> ground_truth_;  // none
   std::vector<std::string> notes_;
 };
 
 StreamSource::StreamSource(VideoInput video, CameraRig rig, const SourceOptions& options, bool is_live)
-    : name_(options.source), video_(std::move(video)), is_live_(is_live), frames_per_s_(video_.frames_per_s()) {
+    : name_(options.source),
+      video_(std::move(video)),
+      is_live_(is_live),
+      with_color_(options.with_color),
+      frames_per_s_(video_.frames_per_s()) {
   if (frames_per_s_ == 0.0 && !is_live_) {
     frames_per_s_ = kAssumedFramesPerS;
     notes_.push_back("Warning: " + name_ +
@@ -65,7 +74,7 @@ StreamSource::StreamSource(VideoInput video, CameraRig rig, const SourceOptions&
   }
   RequireSize(first_image_->width, first_image_->height, rig.left.width_px, rig.left.height_px,
               "the first image of " + name_);
-  rectifier_ = std::make_unique<Rectifier>(rig, SensorType::kMono);
+  rectifier_ = std::make_shared<Rectifier>(rig, SensorType::kMono);
 }
 
 void StreamSource::ChooseFrames(const SourceOptions& options) {
@@ -126,8 +135,19 @@ std::optional<CameraFrame> StreamSource::Next() {
   frame.id = FrameId{next_};
   frame.utime_us = TimeOfLastImage();
   frame.left = rectifier_->Left(std::move(*image));
+  color_ = ColorOfLast();
   ++next_;
   return frame;
+}
+
+// Also after this source is gone.
+ColorReader StreamSource::ColorOfLast() const {
+  ColorReader read = with_color_ ? video_.ColorOfLast() : nullptr;
+  if (!read) return nullptr;
+  return [rectifier = rectifier_, read = std::move(read)]() -> ColorImage {
+    ColorImage image = read();
+    return image.empty() ? image : rectifier->LeftColor(std::move(image));
+  };
 }
 
 void RequireMono(const SourceOptions& options) {

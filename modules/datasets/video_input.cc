@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "datasets/color_pixels.h"
 
 namespace tessera {
 
@@ -79,6 +80,11 @@ std::optional<GrayImage> VideoInput::Read() {
     image.pixels.insert(image.pixels.end(), row, row + image.width);
   }
   return image;
+}
+
+ColorReader VideoInput::ColorOfLast() const {
+  if (impl_->image.type() != CV_8UC3) return nullptr;
+  return [image = impl_->image.clone()] { return ColorsOf(image); };  // the next one takes its place
 }
 
 bool VideoInput::Skip() { return impl_->capture.grab(); }

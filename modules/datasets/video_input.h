@@ -1,4 +1,4 @@
-// Gray images out of video files, V4L2 devices and network streams.
+// Images out of video files, V4L2 devices and network streams.
 #pragma once
 
 #include <memory>
@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/image.h"
+#include "datasets/frame_source.h"
 
 namespace tessera {
 
@@ -22,6 +23,8 @@ class VideoInput {
 
   // The next image; nullopt at the end.
   std::optional<GrayImage> Read();
+  // The colors of the image that Read() returned last; null if it has one channel.
+  ColorReader ColorOfLast() const;
   // Passes over the next image; false at the end.
   bool Skip();
 

@@ -58,6 +58,12 @@ void EvaluatorSession::NoteMap(bool needs_snapshot, int64_t now_us) {
   end_.NoteMap(needs_snapshot ? -1 : record_.map().next_delta(), now_us);
 }
 
+bool EvaluatorSession::HasColors(int64_t now_us) {
+  if (!with_color_ || record_.colors().is_complete()) return true;
+  if (!lacks_colors_us_) lacks_colors_us_ = now_us;
+  return now_us - *lacks_colors_us_ >= kMaxWaitForColorsUs;
+}
+
 const RunRecord& EvaluatorSession::TakeRecord() {
   is_written_ = true;
   return record_;

@@ -221,7 +221,7 @@ std::vector<std::string> WriteRun(const RunRecord& record, const std::string& fo
   WriteFile(run_json, RunJson(record, not_written));
   const size_t num_told = not_written.size();
   for (const RunFile& file : more) try_to_write(file);
-  write_text("map.ply", [&] { return PlyFile(record.map(), base_from_camera); });
+  write_text("map.ply", [&] { return PlyFile(record.map(), record.colors(), base_from_camera); });
   if (not_written.size() > num_told) WriteFile(run_json, RunJson(record, not_written));
   return not_written;
 }

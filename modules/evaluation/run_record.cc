@@ -19,10 +19,12 @@ void AddPoseBits(const Rigid3& pose, Sha256& hash) {
 
 void RunRecord::AddPose(const PoseEstimate& pose, int64_t publish_us) {
   poses_.try_emplace(pose.frame, pose, publish_us);
+  if (pose.is_keyframe) colors_.Expect(pose.frame);
 }
 
 Result<> RunRecord::ApplyDelta(const MapDelta& delta) {
   removed_.Remember(map_, delta);
+  colors_.Receive(delta);
   return map_.Apply(delta);
 }
 

@@ -13,6 +13,7 @@
 #include "evaluation/statistics.h"
 #include "geometry/camera_frame.h"
 #include "geometry/rigid3.h"
+#include "map/landmark_colors.h"
 #include "map/map.h"
 #include "map/removed_keyframes.h"
 #include "messages/tracking_types.h"
@@ -68,6 +69,7 @@ class RunRecord {
   void AddPose(const PoseEstimate& pose, int64_t publish_us);
   // The next change of the map; fails as Map::Apply does.
   Result<> ApplyDelta(const MapDelta& delta);
+  void AddColor(const ColorFrame& color) { colors_.Receive(color); }
   // Keyframes removed from the map, also before the first change received.
   void AddRemoved(const RemovedInDelta& removed);
   void AddGroundTruth(const GroundTruthPose& truth);
@@ -86,6 +88,7 @@ class RunRecord {
   std::vector<FrameRecord> Frames() const;
   FrameCounts Counts() const;
   const Map& map() const { return map_; }
+  const LandmarkColors& colors() const { return colors_; }
   const std::map<std::string, StageRecord>& stages() const { return stages_; }
 
   // Tracked frames, where the map puts them at the end, also those whose reference is no longer in it:
@@ -112,6 +115,7 @@ class RunRecord {
 
   std::map<FrameId, Pose> poses_;
   Map map_;
+  LandmarkColors colors_;
   RemovedKeyframes removed_;
   std::map<FrameId, StampedPose> truth_;
   std::map<std::string, StageRecord> stages_;

@@ -23,6 +23,15 @@ struct CameraFrame {
   bool operator==(const CameraFrame&) const = default;
 };
 
+// The left image of a frame in color, for people: features and the map are made of `CameraFrame::left`.
+struct ColorFrame {
+  FrameId id;
+  int64_t utime_us = 0;  // as CameraFrame's
+  ColorImage image;      // undistorted and rectified as that; empty: there is none
+
+  bool operator==(const ColorFrame&) const = default;
+};
+
 // True pose of the left camera at a frame, where the source knows it.
 struct GroundTruthPose {
   FrameId frame;

@@ -22,6 +22,8 @@ namespace tessera {
 enum class BusKind {
   kMain,    // everything small. All processes listen. The stock tools' default
   kCamera,  // CAMERA. Only the dispatcher, the recorder and the occupancy stage listen
+  kColor,   // COLOR. What shows or colors something listens, and the recorder. The camera bus unless bus.color_url is
+            // set
   kWork,    // TILE_FEATURES. Only the reassembler and the recorder listen
   kMap,     // FEATURES, keyframes, the map. What handles images doesn't listen. The main bus unless bus.map_url is set
   kTile,    // TILE_<n>: one bus for each extractor, which alone listens
@@ -52,6 +54,7 @@ template <class Value>
 struct Topic : Channel {};
 
 inline const Topic<CameraFrame> kCamera{"CAMERA", BusKind::kCamera, Delivery::kFromFirst, Publishers::kOne};
+inline const Topic<ColorFrame> kColor{"COLOR", BusKind::kColor, Delivery::kFromFirst, Publishers::kOne};
 inline const Topic<CameraCalibration> kCalibration{"CALIBRATION", BusKind::kMain, Delivery::kFromFirst,
                                                    Publishers::kOne};
 inline const Topic<GroundTruthPose> kGroundTruth{"GROUND_TRUTH", BusKind::kMain, Delivery::kFromFirst,

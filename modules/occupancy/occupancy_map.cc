@@ -62,6 +62,7 @@ const OccupancyMap::Placed* OccupancyMap::Find(KeyframeId keyframe) const {
 void OccupancyMap::Clear() {
   for (const auto& [key, block] : counts_.blocks()) touched_.insert(key);
   counts_.Clear();
+  colors_.Clear();
   scans_.clear();
 }
 
@@ -77,7 +78,7 @@ void OccupancyMap::Count(const Placed& placed, int sign) {
   for (const SeenVoxels::Hit& hit : seen.hits) {
     Counts& counts = counts_.At(hit.voxel);
     counts.num_hits = static_cast<uint16_t>(counts.num_hits + sign);
-    counts.intensity_sum += static_cast<uint32_t>(sign * hit.intensity);
+    colors_.At(hit.voxel).Add(hit.color, sign);
     touch(hit.voxel);
   }
   for (const octomap::OcTreeKey& voxel : seen.misses) {
@@ -131,6 +132,7 @@ std::string OccupancyMap::ColorTreeFile() const {
   tree.setClampingThresMin(options_.prob_min);
   tree.setClampingThresMax(options_.prob_max);
   for (const auto& [key, block] : counts_.blocks()) {
+    const auto* const colors = colors_.Find(key);
     for (size_t i = 0; i < block->size(); ++i) {
       const Counts& counts = (*block)[i];
       if (StateOf(counts) == VoxelState::kUnknown) continue;
@@ -138,8 +140,8 @@ std::string OccupancyMap::ColorTreeFile() const {
           static_cast<float>(std::clamp(LogOdds(counts), min_, max_)) * static_cast<float>(kLogOddsUnit);
       octomap::ColorOcTreeNode* node = tree.setNodeValue(VoxelAt(key, i), log_odds, /*lazy_eval=*/true);
       if (counts.num_hits == 0) continue;
-      const auto gray = static_cast<uint8_t>(counts.intensity_sum / counts.num_hits);
-      node->setColor(gray, gray, gray);
+      const Rgb color = (*colors)[i].Mean(counts.num_hits);
+      node->setColor(color.red, color.green, color.blue);
     }
   }
   tree.updateInnerOccupancy();

@@ -23,6 +23,7 @@
 #include "core/ids.h"
 #include "geometry/rigid3.h"
 #include "messages/occupancy_types.h"
+#include "occupancy/color_sum.h"
 #include "occupancy/occupancy_options.h"
 #include "occupancy/occupancy_states.h"
 #include "occupancy/ray_caster.h"
@@ -61,14 +62,13 @@ class OccupancyMap {
   std::vector<OccupancyBlock> TakeChangedBlocks();
 
   // OctoMap's file of log-odds and colors (a ColorOcTree, `.ot`): the sum L of each voxel within the bounds of the
-  // options, and the mean intensity of its hits.
+  // options, and the mean color of its hits.
   std::string ColorTreeFile() const;
 
  private:
   struct Counts {
     uint16_t num_hits = 0;
     uint16_t num_misses = 0;
-    uint32_t intensity_sum = 0;  // over the scans that hit it
   };
   VoxelState StateOf(const Counts& counts) const;
   void Count(const Placed& placed, int sign);
@@ -79,6 +79,7 @@ class OccupancyMap {
   int64_t hit_, miss_, min_, max_;  // log-odds, 1/1000
   RayCaster caster_;
   VoxelBlocks<Counts> counts_;
+  VoxelBlocks<ColorSum> colors_;  // over the scans that hit it; in most blocks nothing is hit
   std::map<KeyframeId, Placed> scans_;
   std::set<BlockKey> touched_;               // since TakeChangedBlocks() was called last
   std::map<BlockKey, OccupancyBlock> told_;  // what it returned

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "map/landmark_colors.h"
 #include "map/spanning_tree.h"
 
 namespace tessera {
@@ -12,6 +13,8 @@ namespace {
 int64_t BytesOf(const CameraFrame& frame) {
   return static_cast<int64_t>(frame.left.pixels.size() + frame.right.pixels.size() + 2 * frame.depth.pixels.size());
 }
+
+int64_t BytesOf(const ColorImage& image) { return static_cast<int64_t>(sizeof(Rgb) * image.pixels.size()); }
 
 bool HasImages(const CameraFrame& frame, const CameraCalibration& camera) {
   const auto fits = [&](const auto& image) {
@@ -37,6 +40,32 @@ void OccupancySession::Receive(const CameraFrame& frame) {
   images_.emplace(frame.id, frame);
 }
 
+// The first one counts: a camera that was started again sends empty ones for keyframes before.
+void OccupancySession::Receive(const ColorFrame& color) {
+  if (!options_.with_color || colors_.contains(color.id)) return;
+  const bool has_room = image_bytes_ + BytesOf(color.image) <= options_.max_image_bytes;
+  const ColorImage& kept = colors_[color.id] = has_room ? color.image : ColorImage();
+  image_bytes_ += BytesOf(kept);
+  ColorKeypoints(color.id);
+}
+
+ColorImage OccupancySession::TakeColor(FrameId frame) {
+  const auto found = colors_.find(frame);
+  if (found == colors_.end()) return {};
+  image_bytes_ -= BytesOf(found->second);
+  return std::exchange(found->second, {});
+}
+
+// If both the frame's keypoints and its color are there.
+void OccupancySession::ColorKeypoints(FrameId frame) {
+  const auto keypoints = uncolored_.find(frame);
+  if (keypoints == uncolored_.end() || !colors_.contains(frame)) return;
+  std::vector<Rgb> colors = ColorsAt(keypoints->second, TakeColor(frame));
+  if (!colors.empty()) keypoint_colors_[keyframe_at_.at(frame)] = std::move(colors);
+  uncolored_.erase(keypoints);
+  has_map_changed_ = true;
+}
+
 void OccupancySession::Receive(const PoseEstimate& pose) {
   if (pose.is_keyframe && !keyframe_at_.contains(pose.frame)) announced_.insert(pose.frame);
   last_decided_ = std::max(last_decided_, pose.frame);
@@ -56,6 +85,10 @@ Result<> OccupancySession::Receive(const KeyframeObservation& keyframe) {
     const OccupancyOptions fitted = FitToSensor(options_.map, *camera_);
     TESSERA_RETURN_IF_FAILED(fitted.Check());
     occupancy_.emplace(fitted);
+  }
+  if (options_.with_color && IsMono()) {
+    uncolored_[frame] = keyframe.features.keypoints;
+    ColorKeypoints(frame);
   }
   return {};
 }
@@ -88,8 +121,8 @@ bool OccupancySession::Advance() {
 }
 
 bool OccupancySession::is_done() const {
-  const bool has_all =
-      announced_.empty() && num_without_scan() == 0 && static_cast<int64_t>(keyframe_at_.size()) >= num_expected_;
+  const bool has_all = announced_.empty() && num_without_scan() == 0 && uncolored_.empty() &&
+                       static_cast<int64_t>(keyframe_at_.size()) >= num_expected_;
   return has_map_ended_ && (has_all || has_given_up_) && !has_map_changed_ && plan_.empty() && !FindImage();
 }
 
@@ -107,7 +140,8 @@ int64_t OccupancySession::num_without_scan() const {
 // The first frame whose images are there and that is a keyframe.
 std::optional<FrameId> OccupancySession::FindImage() const {
   for (const auto& [id, frame] : images_) {
-    if (keyframe_at_.contains(id)) return id;
+    const bool has_color = !options_.with_color || has_given_up_ || colors_.contains(id);
+    if (has_color && keyframe_at_.contains(id)) return id;
   }
   return std::nullopt;
 }
@@ -119,9 +153,11 @@ bool OccupancySession::MakeScan() {
   const auto image = images_.extract(*id);
   const CameraFrame& frame = image.mapped();
   image_bytes_ -= BytesOf(frame);
+  ColorImage color = TakeColor(*id);
   if (!HasImages(frame, *camera_)) return true;
-  scans_[keyframe_at_.at(*id)] =
-      std::make_shared<const Scan>(ScanFromImages(frame, *camera_, occupancy_->options(), options_.max_disparity_px));
+  if (color.width != camera_->width_px || color.height != camera_->height_px) color = {};
+  scans_[keyframe_at_.at(*id)] = std::make_shared<const Scan>(
+      ScanFromImages(frame, color, *camera_, occupancy_->options(), options_.max_disparity_px));
   has_map_changed_ = true;
   return true;
 }
@@ -180,7 +216,10 @@ std::optional<Rigid3> OccupancySession::TargetOf(KeyframeId id, const std::set<K
 OccupancyMap::SharedScan OccupancySession::ScanOf(KeyframeId id) const {
   if (!IsMono()) return scans_.at(id);
   const Keyframe* keyframe = replica_.FindKeyframe(id);
-  return std::make_shared<const Scan>(keyframe == nullptr ? Scan{} : ScanFromLandmarks(replica_, *keyframe));
+  if (keyframe == nullptr) return std::make_shared<const Scan>();
+  const auto colors = keypoint_colors_.find(id);
+  return std::make_shared<const Scan>(
+      ScanFromLandmarks(replica_, *keyframe, colors == keypoint_colors_.end() ? std::vector<Rgb>() : colors->second));
 }
 
 bool OccupancySession::IsInPlace(const OccupancyMap::Placed& placed, const Rigid3& target, KeyframeId id) const {

@@ -31,6 +31,8 @@ struct OccupancySessionOptions {
   // Images that are kept: they wait until it is known whether their frame becomes a keyframe, and then until they are
   // made into scans. More are dropped.
   int64_t max_image_bytes = int64_t{256} << 20;
+  // The camera tells each keyframe's color, or that it has none: scans wait for it.
+  bool with_color = false;
 };
 
 class OccupancySession {
@@ -38,6 +40,7 @@ class OccupancySession {
   explicit OccupancySession(const OccupancySessionOptions& options) : options_(options) {}
 
   void Receive(const CameraFrame& frame);
+  void Receive(const ColorFrame& color);
   void Receive(const PoseEstimate& pose);
   // Fails where the settings do not fit the sensor.
   Result<> Receive(const KeyframeObservation& keyframe);
@@ -69,6 +72,8 @@ class OccupancySession {
 
  private:
   std::optional<FrameId> FindImage() const;
+  ColorImage TakeColor(FrameId frame);
+  void ColorKeypoints(FrameId frame);
   bool MakeScan();
   void Plan();
   void Place(KeyframeId id);
@@ -89,6 +94,10 @@ class OccupancySession {
   int64_t image_bytes_ = 0;
   std::map<FrameId, KeyframeId> keyframe_at_;  // that the tracker sent
   std::set<FrameId> announced_;                // by POSE, and not yet sent
+  std::map<FrameId, ColorImage> colors_;       // that came; empty from when they are used
+  // Mono: keypoints of keyframes whose colors did not come yet, and the colors of keypoints.
+  std::map<FrameId, std::vector<Keypoint>> uncolored_;
+  std::map<KeyframeId, std::vector<Rgb>> keypoint_colors_;
   std::map<KeyframeId, OccupancyMap::SharedScan> scans_;
 
   int64_t num_expected_ = 0;  // keyframes; fewer than that were not all received

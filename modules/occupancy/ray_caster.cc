@@ -34,7 +34,7 @@ std::vector<RayCaster::End> RayCaster::CollectEnds(const Scan& scan, const Rigid
     if (!is_within) continue;
     End& end = ends[mark - 1];
     ++end.num_points;
-    end.intensity_sum += point.intensity;
+    end.color_sum.Add(point.color);
   }
   return ends;
 }
@@ -47,7 +47,7 @@ SeenVoxels RayCaster::Cast(const Scan& scan, const Rigid3& world_from_camera) {
   VoxelBlocks<Mark> marks;
   for (const End& end : CollectEnds(scan, world_from_camera, marks)) {
     if (end.num_points > 0) {
-      seen.hits.push_back({end.voxel, static_cast<uint8_t>(end.intensity_sum / end.num_points)});
+      seen.hits.push_back({end.voxel, end.color_sum.Mean(end.num_points)});
     } else {
       seen.misses.push_back(end.voxel);
     }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geometry/rigid3.h"
+#include "occupancy/color_sum.h"
 #include "occupancy/occupancy_options.h"
 #include "occupancy/scan.h"
 #include "occupancy/voxel_blocks.h"
@@ -15,7 +16,7 @@ namespace tessera {
 struct SeenVoxels {
   struct Hit {
     octomap::OcTreeKey voxel;
-    uint8_t intensity = 0;  // mean of its points
+    Rgb color;  // mean of its points
   };
   std::vector<Hit> hits;                   // each voxel once
   std::vector<octomap::OcTreeKey> misses;  // each voxel once; no hit is among them
@@ -35,7 +36,7 @@ class RayCaster {
   struct End {
     octomap::OcTreeKey voxel;
     uint32_t num_points = 0;  // within the range
-    uint32_t intensity_sum = 0;
+    ColorSum color_sum;
   };
   // What is known of a voxel while one scan is cast: kUntouched, kMissed, or else one more than its index in `ends`.
   using Mark = uint32_t;

@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 constexpr double kMaxCount = std::numeric_limits<uint16_t>::max();
-constexpr uint8_t kUnknownIntensity = 255;  // OctoMap's color of a voxel without one
+constexpr Rgb kUnknownColor{255, 255, 255};  // OctoMap's of a voxel without one
 constexpr double kDisparitySigmaPx = 0.25;
 
 // The number of pixels from one ray to the next.
@@ -74,8 +74,8 @@ DepthImage DepthOfStereo(const CameraFrame& frame, const CameraCalibration& came
 
 }  // namespace
 
-Scan ScanFromImages(const CameraFrame& frame, const CameraCalibration& camera, const OccupancyOptions& options,
-                    int max_disparity_px) {
+Scan ScanFromImages(const CameraFrame& frame, const ColorImage& color, const CameraCalibration& camera,
+                    const OccupancyOptions& options, int max_disparity_px) {
   Scan scan{.camera = camera, .stride_px = StrideFor(camera, options)};
   if (camera.sensor == SensorType::kRgbd) {
     scan.depth_unit_m = camera.depth_unit_m;
@@ -85,17 +85,22 @@ Scan ScanFromImages(const CameraFrame& frame, const CameraCalibration& camera, c
     scan.depth_unit_m = 2.0 * options.max_range / kMaxCount;
     scan.depth = Sample(DepthOfStereo(frame, camera, scan.depth_unit_m, max_disparity_px), scan.stride_px);
   }
-  scan.intensity = Sample(frame.left, scan.stride_px);
+  if (color.empty()) {
+    scan.intensity = Sample(frame.left, scan.stride_px);
+  } else {
+    scan.color = Sample(color, scan.stride_px);
+  }
   return scan;
 }
 
-Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe) {
+Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe, const std::vector<Rgb>& colors) {
   Scan scan{.camera = keyframe.features->calibration};
   const Rigid3 camera_from_world = keyframe.world_from_camera.Inverse();
-  for (const LandmarkId id : keyframe.landmarks) {
-    if (const Landmark* landmark = map.FindLandmark(id)) {
-      scan.landmarks_in_camera.push_back(camera_from_world * landmark->position_in_world);
-    }
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    const Landmark* const landmark = map.FindLandmark(keyframe.landmarks[i]);
+    if (landmark == nullptr) continue;
+    scan.landmarks_in_camera.push_back(camera_from_world * landmark->position_in_world);
+    if (!colors.empty()) scan.landmark_colors.push_back(colors[i]);
   }
   return scan;
 }
@@ -107,13 +112,21 @@ double UncertaintyAt(double distance, const CameraCalibration& camera) {
 
 std::vector<ScanPoint> PointsOf(const Scan& scan) {
   std::vector<ScanPoint> points;
-  for (const Eigen::Vector3d& landmark : scan.landmarks_in_camera) points.push_back({landmark, kUnknownIntensity});
+  for (size_t i = 0; i < scan.landmarks_in_camera.size(); ++i) {
+    points.push_back(
+        {scan.landmarks_in_camera[i], scan.landmark_colors.empty() ? kUnknownColor : scan.landmark_colors[i]});
+  }
+  const auto color_at = [&scan](int x, int y) {
+    if (!scan.color.empty()) return scan.color.row(y)[x];
+    const uint8_t gray = scan.intensity.row(y)[x];
+    return Rgb{gray, gray, gray};
+  };
   for (int y = 0; y < scan.depth.height; ++y) {
     for (int x = 0; x < scan.depth.width; ++x) {
       const uint16_t count = scan.depth.row(y)[x];
       if (count == 0) continue;
       const Eigen::Vector2d pixel(scan.stride_px * x, scan.stride_px * y);
-      points.push_back({scan.depth_unit_m * count * scan.camera.Ray(pixel), scan.intensity.row(y)[x]});
+      points.push_back({scan.depth_unit_m * count * scan.camera.Ray(pixel), color_at(x, y)});
     }
   }
   return points;

@@ -13,30 +13,34 @@ namespace tessera {
 
 struct ScanPoint {
   Eigen::Vector3d in_camera;  // m (mono: units of the map)
-  uint8_t intensity = 0;
+  Rgb color;
 };
 
-// Three bytes for each pixel that is kept, whose rays are no farther apart than a voxel at the maximum range; or a few
-// hundred landmarks.
+// Three bytes for each pixel that is kept, five with color, whose rays are no farther apart than a voxel at the maximum
+// range; or a few hundred landmarks.
 struct Scan {
   CameraCalibration camera;
   int stride_px = 1;                                 // kept are the pixels (i, j) * stride_px
   double depth_unit_m = 0.0;                         // of `depth`
   DepthImage depth;                                  // at these pixels; 0: unknown
-  GrayImage intensity;                               // likewise
+  GrayImage intensity;                               // likewise, if its color is not known
+  ColorImage color;                                  // likewise, if it is
   std::vector<Eigen::Vector3d> landmarks_in_camera;  // mono; then there are no images
+  std::vector<Rgb> landmark_colors;                  // of each, or empty: not known
 
   bool operator==(const Scan&) const = default;
 };
 
 // From the depth image of an RGB-D frame, or from the two images of a stereo frame by semi-global matching of
 // disparities up to `max_disparity_px` (H. Hirschmueller, "Stereo Processing by Semiglobal Matching and Mutual
-// Information", PAMI 2008; OpenCV's StereoSGBM, in integers). The frame's images must have the camera's size.
-Scan ScanFromImages(const CameraFrame& frame, const CameraCalibration& camera, const OccupancyOptions& options,
-                    int max_disparity_px);
+// Information", PAMI 2008; OpenCV's StereoSGBM, in integers). The frame's images must have the camera's size, as must
+// `color`, its left image in color; empty: that is gray.
+Scan ScanFromImages(const CameraFrame& frame, const ColorImage& color, const CameraCalibration& camera,
+                    const OccupancyOptions& options, int max_disparity_px);
 
-// From the landmarks that a keyframe observes, in the order of its keypoints.
-Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe);
+// From the landmarks that a keyframe observes, in the order of its keypoints. `colors`: of its keypoints; empty: not
+// known.
+Scan ScanFromLandmarks(const Map& map, const Keyframe& keyframe, const std::vector<Rgb>& colors);
 
 // How far before and behind its point a surface may be that a scan of this camera sees at this distance, m: twice the
 // standard deviation of the depth of stereo,

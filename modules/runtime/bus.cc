@@ -56,6 +56,8 @@ std::string UrlOf(const Channel& channel, const Settings& settings) {
       return bus.main_url;
     case BusKind::kCamera:
       return bus.camera_url;
+    case BusKind::kColor:
+      return bus.color_url.empty() ? bus.camera_url : bus.color_url;
     case BusKind::kWork:
       return bus.work_url;
     case BusKind::kMap:

@@ -17,8 +17,8 @@ bool HasNoOrder(const WireType* type) { return IsOneOf(type, {"extractor_ready_t
 
 // What a camera, or a log player in its place, sends.
 bool IsSentByCameras(const std::string& channel) {
-  return channel == kCamera.name || channel == kCalibration.name || channel == kGroundTruth.name ||
-         channel == kEndOfStream.name;
+  return channel == kCamera.name || channel == kColor.name || channel == kCalibration.name ||
+         channel == kGroundTruth.name || channel == kEndOfStream.name;
 }
 
 }  // namespace

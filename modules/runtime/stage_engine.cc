@@ -186,7 +186,7 @@ void StageEngine::SubscribeAll(IncomingStreams::RawHandler handler) {
         if (stage_is_gone_) return;
         CallStage("a message on " + channel, [&] { handler(channel, message, arrival_us); });
       });
-  for (const Channel& channel : std::initializer_list<Channel>{kHeartbeat, kCamera, kTileFeatures, kMapDelta}) {
+  for (const Channel& channel : std::initializer_list<Channel>{kHeartbeat, kCamera, kColor, kTileFeatures, kMapDelta}) {
     incoming_.AddAll(BusOf(channel));
   }
 }

@@ -41,7 +41,8 @@ StreamSettings StreamSettings::From(const Settings& settings) {
 }
 
 size_t StreamSettings::MaxMessageBytes(BusKind bus) const {
-  return bus == BusKind::kCamera || bus == BusKind::kMap ? max_local_message_bytes : max_message_bytes;
+  const bool is_local = bus == BusKind::kCamera || bus == BusKind::kColor || bus == BusKind::kMap;
+  return is_local ? max_local_message_bytes : max_message_bytes;
 }
 
 StreamReceiverOptions StreamSettings::ReceiverOf(BusKind bus) const {

@@ -41,7 +41,7 @@ bool IsChannelPrefix(const std::string& text);
 
 struct BusSettings {
   static constexpr const char* kSection = "bus";
-  std::string main_url, camera_url, work_url, map_url, tile_url;
+  std::string main_url, camera_url, color_url, work_url, map_url, tile_url;
   int first_tile_port = 0;
   std::string channel_prefix;
   int receive_buffer_bytes = 0;
@@ -54,6 +54,7 @@ struct BusSettings {
   static void Visit(Self& self, Field&& field) {
     field("main_url", self.main_url);
     field("camera_url", self.camera_url);
+    field("color_url", self.color_url);
     field("work_url", self.work_url);
     field("map_url", self.map_url);
     field("tile_url", self.tile_url);
@@ -97,6 +98,7 @@ struct CameraSettings {
   int lockstep_window = 0;
   double depth_unit_m = 0.0;
   double give_up_s = 0.0;
+  bool color = false;
 
   template <class Self, class Field>
   static void Visit(Self& self, Field&& field) {
@@ -109,6 +111,7 @@ struct CameraSettings {
     field("lockstep_window", self.lockstep_window, Range{1, 1000, "frames"});
     field("depth_unit_m", self.depth_unit_m, Range{0, 1, "m"});
     field("give_up_s", self.give_up_s, Range{0, 1e6, "s"});
+    field("color", self.color);
   }
 };
 

@@ -1,4 +1,4 @@
-// CAMERA, CALIBRATION, GROUND_TRUTH, END_OF_STREAM.
+// CAMERA, COLOR, CALIBRATION, GROUND_TRUTH, END_OF_STREAM.
 #include <algorithm>
 #include <iterator>
 #include <string_view>
@@ -7,6 +7,7 @@
 #include "messages/end_of_stream.h"
 #include "tessera/calibration_t.hpp"
 #include "tessera/camera_image_t.hpp"
+#include "tessera/color_image_t.hpp"
 #include "tessera/end_of_stream_t.hpp"
 #include "tessera/ground_truth_t.hpp"
 #include "wire/codec_impl.h"
@@ -53,6 +54,24 @@ struct Layout<camera_image_t> {
   }
 };
 TESSERA_CODEC(CameraFrame, camera_image_t);
+
+template <>
+struct Layout<color_image_t> {
+  template <class Fields, class Message, class Value>
+  static void Describe(Fields& fields, Message& message, Value& frame) {
+    auto& image = frame.image;
+    fields.Key(message.frame, frame.id);
+    fields.Time(message.utime, frame.utime_us);
+    fields.Key(message.width, image.width);
+    fields.Key(message.height, image.height);
+    fields.Check(frame.id.valid(), "its frame number is negative");
+    fields.Check((image.width == 0 && image.height == 0) ||
+                     IsInside({0, 0, image.width, image.height}, kMaxImageSize, kMaxImageSize),
+                 "its image size is neither 0 nor between 1 and 16384 px");
+    fields.Bands(message.band, ImageField{image_band_t::LEFT, image, image.width, image.height});
+  }
+};
+TESSERA_CODEC(ColorFrame, color_image_t);
 
 template <>
 struct Layout<calibration_t> {

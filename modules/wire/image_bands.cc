@@ -13,6 +13,8 @@ constexpr size_t kMaxReservedPixels = size_t{1} << 23;
 
 constexpr int8_t EncodingOf(const GrayImage&) { return image_band_t::GRAY8; }
 constexpr int8_t EncodingOf(const DepthImage&) { return image_band_t::DEPTH16; }
+constexpr int8_t EncodingOf(const ColorImage&) { return image_band_t::RGB8; }
+static_assert(sizeof(Rgb) == 3);
 
 Rect NextBand(int x, int y, int width, int height, int max_pixels) {
   const int rows = max_pixels / width;
@@ -72,11 +74,17 @@ size_t FillBand(int8_t name, const GrayImage& image, size_t first, size_t max_by
 size_t FillBand(int8_t name, const DepthImage& image, size_t first, size_t max_bytes, image_band_t* band) {
   return Fill(name, image, first, max_bytes, band);
 }
+size_t FillBand(int8_t name, const ColorImage& image, size_t first, size_t max_bytes, image_band_t* band) {
+  return Fill(name, image, first, max_bytes, band);
+}
 
 Result<> AppendBand(const image_band_t& band, int width, int height, GrayImage* image) {
   return Append(band, width, height, image);
 }
 Result<> AppendBand(const image_band_t& band, int width, int height, DepthImage* image) {
+  return Append(band, width, height, image);
+}
+Result<> AppendBand(const image_band_t& band, int width, int height, ColorImage* image) {
   return Append(band, width, height, image);
 }
 

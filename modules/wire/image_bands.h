@@ -15,9 +15,11 @@ namespace tessera {
 // Returns how many.
 size_t FillBand(int8_t name, const GrayImage& image, size_t first, size_t max_bytes, image_band_t* band);
 size_t FillBand(int8_t name, const DepthImage& image, size_t first, size_t max_bytes, image_band_t* band);
+size_t FillBand(int8_t name, const ColorImage& image, size_t first, size_t max_bytes, image_band_t* band);
 
 // Appends a band to an image of the given size, of which the pixels before the band must have come already.
 Result<> AppendBand(const image_band_t& band, int width, int height, GrayImage* image);
 Result<> AppendBand(const image_band_t& band, int width, int height, DepthImage* image);
+Result<> AppendBand(const image_band_t& band, int width, int height, ColorImage* image);
 
 }  // namespace tessera

@@ -33,7 +33,9 @@ struct RecordedStream {
 
 using StreamName = std::pair<std::string, int64_t>;  // publisher and its start
 
-std::array<const Channel*, 4> CameraChannels() { return {&kCalibration, &kGroundTruth, &kCamera, &kEndOfStream}; }
+std::array<const Channel*, 5> CameraChannels() {
+  return {&kCalibration, &kGroundTruth, &kCamera, &kEndOfStream, &kColor};
+}
 
 // By number, each once, and only of values of which every part is there.
 std::vector<Place> WholeValues(std::vector<Place> places) {
@@ -67,18 +69,23 @@ struct LogReader::Impl {
   int64_t NumFramesSent();
   FrameId IdOfFrame(size_t first_place);
   template <class Value>
-  std::optional<LoggedValue> Join(ValueJoiner<Value>& joiner, const LogEvent& event, const MessageHeader& header);
+  std::optional<Value> Join(ValueJoiner<Value>& joiner, const LogEvent& event, const MessageHeader& header);
+  std::pair<LogEvent, MessageHeader> NextOf(RecordedStream& stream);
   std::optional<LoggedValue> Take(size_t channel);
+  void ReadColor();
 
   std::string path;
   LogFileReader file;
   std::array<RecordedStream, 4> streams;  // in the order of CameraChannels()
+  RecordedStream colors;                  // the last of them
   int64_t num_frames = 0;
   int64_t num_frames_sent = 0;
   ValueJoiner<CameraCalibration> calibrations;
   ValueJoiner<GroundTruthPose> truths;
   ValueJoiner<CameraFrame> frames;
   ValueJoiner<EndOfStream> ends;
+  ValueJoiner<ColorFrame> color_joiner;
+  std::optional<ColorFrame> color;  // the last one read
 };
 
 LogReader::Impl::Impl(const std::string& log_path, const std::string& prefix) : path(log_path), file(log_path) {
@@ -87,7 +94,7 @@ LogReader::Impl::Impl(const std::string& log_path, const std::string& prefix) : 
 
 // Finds the messages of the one camera that the log must hold.
 void LogReader::Impl::Index(const std::string& prefix) {
-  std::array<std::map<StreamName, std::vector<Place>>, 4> found;
+  std::array<std::map<StreamName, std::vector<Place>>, 5> found;
   LogEvent event;
   for (int64_t position = file.position(); file.Next(&event); position = file.position()) {
     for (size_t i = 0; i < found.size(); ++i) {
@@ -107,7 +114,8 @@ void LogReader::Impl::Index(const std::string& prefix) {
                      " recordings of a camera: record each into a log of its own");
   }
   const StreamName camera = cameras.begin()->first;
-  for (size_t i = 0; i < found.size(); ++i) streams[i].places = WholeValues(std::move(found[i][camera]));
+  for (size_t i = 0; i < streams.size(); ++i) streams[i].places = WholeValues(std::move(found[i][camera]));
+  colors.places = WholeValues(std::move(found.back()[camera]));
   num_frames = std::count_if(streams[2].places.begin(), streams[2].places.end(),
                              [](const Place& place) { return place.part == 0; });
   if (num_frames == 0) {
@@ -143,25 +151,23 @@ FrameId LogReader::Impl::IdOfFrame(size_t first_place) {
     file.Seek(streams[2].places[i].position);
     file.Next(&event);
     const auto header = ReadHeader(event.data);
-    const std::optional<LoggedValue> frame = Join(joiner, event, *header);
-    if (frame) return std::get<CameraFrame>(*frame).id;
+    if (const auto frame = Join(joiner, event, *header)) return frame->id;
   }
   return {};
 }
 
 template <class Value>
-std::optional<LoggedValue> LogReader::Impl::Join(ValueJoiner<Value>& joiner, const LogEvent& event,
-                                                 const MessageHeader& header) {
+std::optional<Value> LogReader::Impl::Join(ValueJoiner<Value>& joiner, const LogEvent& event,
+                                           const MessageHeader& header) {
   const Result<const Value*> value = joiner.Add(event.data, header);
   if (!value) {
     throw InputError("log " + path + " holds a damaged message on " + event.channel + ": " + value.error().sentence);
   }
-  return *value == nullptr ? std::nullopt : std::optional<LoggedValue>(**value);
+  return *value == nullptr ? std::nullopt : std::optional<Value>(**value);
 }
 
-// The value that the next message of the channel completes, if it does.
-std::optional<LoggedValue> LogReader::Impl::Take(size_t channel) {
-  RecordedStream& stream = streams[channel];
+// The next message of the stream, and its header.
+std::pair<LogEvent, MessageHeader> LogReader::Impl::NextOf(RecordedStream& stream) {
   file.Seek(stream.position());
   ++stream.next;
   LogEvent event;
@@ -170,16 +176,28 @@ std::optional<LoggedValue> LogReader::Impl::Take(size_t channel) {
   if (!header) {
     throw InputError("log " + path + " changed while it was read");
   }
+  return {std::move(event), *header};
+}
+
+// The value that the next message of the channel completes, if it does.
+std::optional<LoggedValue> LogReader::Impl::Take(size_t channel) {
+  const auto [event, header] = NextOf(streams[channel]);
   switch (channel) {
     case 0:
-      return Join(calibrations, event, *header);
+      return Join(calibrations, event, header);
     case 1:
-      return Join(truths, event, *header);
+      return Join(truths, event, header);
     case 2:
-      return Join(frames, event, *header);
+      return Join(frames, event, header);
     default:
-      return Join(ends, event, *header);
+      return Join(ends, event, header);
   }
+}
+
+// Sets `color` if the next message of COLOR completes one.
+void LogReader::Impl::ReadColor() {
+  const auto [event, header] = NextOf(colors);
+  if (auto value = Join(color_joiner, event, header)) color = std::move(*value);
 }
 
 LogReader::LogReader(const std::string& path, const std::string& channel_prefix)
@@ -203,6 +221,17 @@ std::optional<LoggedValue> LogReader::Next() {
       return value;
     }
   }
+}
+
+bool LogReader::has_colors() const { return !impl_->colors.places.empty(); }
+
+ColorImage LogReader::ColorOf(FrameId frame) {
+  std::optional<ColorFrame>& color = impl_->color;
+  while (!color || color->id < frame) {
+    if (impl_->colors.done()) return {};
+    impl_->ReadColor();
+  }
+  return color->id == frame ? std::exchange(color, std::nullopt)->image : ColorImage();
 }
 
 int64_t LogReader::num_frames() const { return impl_->num_frames; }

@@ -14,9 +14,9 @@ namespace tessera {
 
 using LoggedValue = std::variant<CameraCalibration, GroundTruthPose, CameraFrame, EndOfStream>;
 
-// Reads CALIBRATION, GROUND_TRUTH, CAMERA and the camera's END_OF_STREAM of one log, recorded by any means: messages
-// that were recorded out of order or twice are put right by their numbers, parts are joined. A value that lacks a part
-// is left out, since stock recorders ask for nothing again.
+// Reads CALIBRATION, GROUND_TRUTH, CAMERA, COLOR and the camera's END_OF_STREAM of one log, recorded by any means:
+// messages that were recorded out of order or twice are put right by their numbers, parts are joined. A value that
+// lacks a part is left out, since stock recorders ask for nothing again.
 class LogReader {
  public:
   // Looks through the whole log at once, so that a damaged one is refused before anything is played. Throws
@@ -27,6 +27,12 @@ class LogReader {
 
   // The next value, in recorded order; nullopt at the end. Throws InputError if it makes no sense.
   std::optional<LoggedValue> Next();
+
+  // Whether there is anything on COLOR.
+  bool has_colors() const;
+  // The color of a frame, which may stand anywhere in the log; empty if there is none. Frames must be asked for in
+  // ascending order. Throws as above.
+  ColorImage ColorOf(FrameId frame);
 
   // Whole frames in the log.
   int64_t num_frames() const;

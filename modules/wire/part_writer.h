@@ -128,6 +128,8 @@ class PartWriter {
 
   template <class... SomeImages>
   void Bands(image_band_t& band, const ImageField<SomeImages>&... images) {
+    band.image = band.encoding = 0;
+    WriteField(Rect{}, band.pixels);
     band.num_bytes = 0;
     band.data.clear();
     size_t& next = next_of_list();

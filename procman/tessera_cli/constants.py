@@ -4,11 +4,13 @@
 MULTICAST_GROUP = "239.255.76.67"
 # On a LAN, what is large has groups of its own: a switch that snoops IGMP delivers it to those hosts alone that listen.
 # {id} is the extractor's.
-LAN_GROUPS = {"camera": "239.255.76.68", "work": "239.255.76.69", "map": "239.255.76.70"}
+LAN_GROUPS = {"camera": "239.255.76.68", "work": "239.255.76.69", "map": "239.255.76.70", "color": "239.255.76.71"}
 LAN_TILE_GROUP = "239.255.77.{id}"
 DEFAULT_PORT = 7667
 # Of each bus, from the base port (--port).
-PORT_OFFSETS = {"main": 0, "camera": 1, "work": 2, "procman": 3, "map": 4}
+PORT_OFFSETS = {"main": 0, "camera": 1, "work": 2, "procman": 3, "map": 4, "color": 5}
+# Those whose URLs are settings of a stack.
+STACK_BUSES = ("main", "camera", "color", "work", "map")
 FIRST_TILE_PORT_OFFSET = 13
 # A message that fits one packet of a LAN: the loss of one fragment would lose a larger message whole.
 LAN_MESSAGE_BYTES = 1400
@@ -23,7 +25,7 @@ MAX_MESSAGES_PER_TURN = 200
 
 # --- Channels (lcmtypes/README.md) --------------------------------------------------------------------------------
 STATUS, POSE, HEARTBEAT, CAMERA, END_OF_STREAM = "STATUS", "POSE", "HEARTBEAT", "CAMERA", "END_OF_STREAM"
-REPAIR = "REPAIR"
+REPAIR, COLOR = "REPAIR", "COLOR"
 PROCMAN_ORDER, PROCMAN_STATUS, PROCMAN_OUTPUT = "PROCMAN_ORDER", "PROCMAN_STATUS", "PROCMAN_OUTPUT"
 
 # --- Limits -------------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ import tessera as message_types
 from tessera import (
     calibration_t,
     camera_image_t,
+    color_image_t,
     end_of_stream_t,
     features_t,
     ground_truth_t,
@@ -41,6 +42,7 @@ from tessera import (
 __all__ = [
     "calibration_t",
     "camera_image_t",
+    "color_image_t",
     "decode",
     "end_of_stream_t",
     "features_t",

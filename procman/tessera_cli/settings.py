@@ -12,6 +12,7 @@ from tessera_cli.constants import (
     FIRST_TILE_PORT_OFFSET,
     LAN_MESSAGE_BYTES,
     LAN_TILE_GROUP,
+    STACK_BUSES,
 )
 from tessera_cli.errors import UserError
 from tessera_cli.files import BIN, ROOT
@@ -25,7 +26,7 @@ Settings = dict[str, dict[str, Any]]  # sections of keys
 
 def network_assignments(port: int, on_lan: bool) -> list[str]:
     """The buses of a stack with this base port; `on_lan`: their messages leave this machine."""
-    assignments = [f"bus.{bus}_url={stack_bus_url(bus, port, on_lan)}" for bus in ("main", "camera", "work", "map")]
+    assignments = [f"bus.{bus}_url={stack_bus_url(bus, port, on_lan)}" for bus in STACK_BUSES]
     assignments.append(f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}")
     if on_lan:
         tile_url = f"udpm://{LAN_TILE_GROUP}:{{port}}?ttl=1"

@@ -32,6 +32,13 @@ class FakeSource : public FrameSource {
     frame.utime_us = kFrameUs * next_++;
     return frame;
   }
+  // As wide as the number of the frame; those of odd frames have become unreadable.
+  ColorReader TakeColor() override {
+    return [frame = static_cast<int>(next_ - 1)] {
+      if (frame % 2 == 1) throw InputError("the file is gone");
+      return ColorImage(frame, 1);
+    };
+  }
   void SkipTo(FrameId frame) override { next_ = std::max(next_, frame.value); }
   bool is_live() const override { return live_; }
   const std::vector<std::string>& notes() const override { return notes_; }
@@ -189,6 +196,42 @@ TEST(CameraSession, LockstepAsksForHelpWhenNoPoseComes) {
   EXPECT_THAT(session.MarkTracked({0}, 0, CameraSession::kNoPoseUs + 3), IsSuccess());
   EXPECT_FALSE(session.Watch(CameraSession::kNoPoseUs + 4));
   EXPECT_TRUE(session.Watch(2 * CameraSession::kNoPoseUs + 4)) << "and again";
+}
+
+TEST(CameraSession, TellsTheColorsOfKeyframes) {
+  CameraSession session(std::make_unique<FakeSource>(10, false, -1),
+                        {{.lockstep_window = 6}, true, 10, /*with_color=*/true}, 0);
+  EXPECT_TRUE(AllOf<ColorFrame>(AdvanceAll(session)).empty()) << "it is not known yet which frames become keyframes";
+  ASSERT_THAT(session.MarkTracked({2}, 2 * kFrameUs, 0), IsSuccess());
+  const std::vector<ColorFrame> colors = AllOf<ColorFrame>(session.TellColor({2}, 2 * kFrameUs));
+  ASSERT_EQ(colors.size(), 1U);
+  EXPECT_EQ(colors[0], (ColorFrame{.id = {2}, .utime_us = 2 * kFrameUs, .image = ColorImage(2, 1)}));
+  ASSERT_THAT(session.MarkTracked({4}, 4 * kFrameUs, 0), IsSuccess());
+  for (const int64_t frame : {2, 5}) {  // was tracked before; unreadable
+    const std::vector<ColorFrame> none = AllOf<ColorFrame>(session.TellColor({frame}, 0));
+    ASSERT_EQ(none.size(), 1U);
+    EXPECT_TRUE(none[0].image.empty());
+  }
+}
+
+TEST(CameraSession, WhereNobodyTracksAllFramesHaveTheirColorInFrontOfThem) {
+  CameraSession session(std::make_unique<FakeSource>(3, false, -1), {{}, false, 0, /*with_color=*/true}, 0);
+  std::vector<std::string> sent;
+  for (const CameraAction& action : AdvanceAll(session)) {
+    if (const auto* frame = std::get_if<CameraFrame>(&action))
+      sent.push_back("frame " + std::to_string(frame->id.value));
+    if (const auto* color = std::get_if<ColorFrame>(&action))
+      sent.push_back("color " + std::to_string(color->id.value));
+  }
+  EXPECT_EQ(sent, (std::vector<std::string>{"frame 0", "frame 1", "color 2", "frame 2"}))
+      << "empty images are left out";
+}
+
+TEST(CameraSession, ColorsThatNobodyWantsAreNotTold) {
+  CameraSession session = Recorded(3);
+  AdvanceAll(session);
+  ASSERT_THAT(session.MarkTracked({2}, 2 * kFrameUs, 0), IsSuccess());
+  EXPECT_TRUE(session.TellColor({2}, 2 * kFrameUs).empty());
 }
 
 }  // namespace

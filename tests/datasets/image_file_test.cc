@@ -14,6 +14,19 @@ TEST(ImageFile, ReadsWhatWasWritten) {
   }
 }
 
+TEST(ImageFile, ReadsColorsOfColorImagesAlone) {
+  const DatasetFolder folder;
+  cv::Mat image(21, 37, CV_8UC3, cv::Scalar(200, 100, 50));  // blue first
+  folder.WriteImage("color.png", image);
+  EXPECT_EQ(ReadColorImage(folder.path("color.png")), ColorImage(37, 21, {.red = 50, .green = 100, .blue = 200}));
+  folder.WriteImage("gray.png", DatasetFolder::Pattern(37, 21, 1));
+  EXPECT_TRUE(ReadColorImage(folder.path("gray.png")).empty());
+  image.setTo(cv::Scalar(70, 70, 70));
+  folder.WriteImage("colorless.png", image);
+  EXPECT_TRUE(ReadColorImage(folder.path("colorless.png")).empty());
+  EXPECT_EQ(ReadGrayImage(folder.path("colorless.png")), GrayImage(37, 21, 70));
+}
+
 TEST(ImageFile, RefusesEveryTruncatedJpegAndPng) {
   const DatasetFolder folder;
   for (const char* name : {"a.jpg", "a.png"}) {

@@ -28,7 +28,7 @@ struct Evaluator {
     EXPECT_THAT(session.Receive(EndOfStream{.stage = StageKind::kMapper, .num_values = 1}, kSecond), IsSuccess());
   }
 
-  EvaluatorSession session{"evaluator"};
+  EvaluatorSession session{"evaluator", false};
 };
 
 TEST(EvaluatorSession, WritesOnceWhenAllIsThere) {
@@ -44,6 +44,22 @@ TEST(EvaluatorSession, WritesOnceWhenAllIsThere) {
   EXPECT_EQ(record.Keyframes().size(), 1U);
   EXPECT_FALSE(evaluator.session.MustWrite(kSecond));
   EXPECT_FALSE(evaluator.session.MayWrite());
+}
+
+TEST(EvaluatorSession, WaitsForTheColorsOfKeyframesForAWhile) {
+  for (const bool comes : {true, false}) {
+    Evaluator evaluator{EvaluatorSession{"evaluator", /*with_color=*/true}};
+    evaluator.SendPoses();
+    EXPECT_THAT(evaluator.session.Receive(PoseEstimate{.frame = {2}, .is_keyframe = true}, 7, kSecond), IsSuccess());
+    evaluator.SendMap();
+    EXPECT_THAT(evaluator.session.Receive(EndOfStream{StageKind::kTracker, 3, 0}, kSecond), IsSuccess());
+    EXPECT_THAT(evaluator.session.Receive(EndOfStream{.stage = StageKind::kMapper, .num_values = 1}, kSecond),
+                IsSuccess());
+    EXPECT_FALSE(evaluator.session.MustWrite(kSecond));
+    if (comes) evaluator.session.Receive(ColorFrame{.id = {2}});
+    EXPECT_EQ(evaluator.session.MustWrite(2 * kSecond), comes);
+    EXPECT_EQ(evaluator.session.MustWrite(kSecond + EvaluatorSession::kMaxWaitForColorsUs), true);
+  }
 }
 
 TEST(EvaluatorSession, AFrameFarBeyondAllOthersIsNoneOfTheSource) {

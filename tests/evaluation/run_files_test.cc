@@ -130,6 +130,17 @@ TEST_F(RunFilesTest, PosesAreThoseOfTheBodyAndTheHashesStay) {
             "1.000000000\n");
 }
 
+TEST_F(RunFilesTest, LandmarksHaveColorsInTheMapsFileWhereTheyAreKnown) {
+  RunRecord record = SmallRun();
+  WriteRun(record, folder_);
+  EXPECT_EQ(Read("map.ply").find("red"), std::string::npos);
+  record.AddColor({.id = {1}, .image = ColorImage(2, 2, {.red = 'r', .green = 'g', .blue = 'b'})});
+  WriteRun(record, folder_);
+  const std::string ply = Read("map.ply");
+  EXPECT_NE(ply.find("property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"), std::string::npos);
+  EXPECT_EQ(ply.substr(ply.size() - 7), std::string("\1\0\0\0rgb", 7)) << "one observer, and its color";
+}
+
 TEST_F(RunFilesTest, TrajectorySaysThatItsPartsAreNotJoined) {
   RunRecord record = SmallRun();
   ASSERT_EQ(record.Parts().size(), 1U);

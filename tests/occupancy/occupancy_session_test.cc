@@ -238,7 +238,7 @@ TEST(OccupancySession, MonoNeedsNoImages) {
   ASSERT_TRUE(session.is_done());
   OccupancyMap scratch({.resolution = 0.1, .max_range = 5.0});
   map.keyframes().ForEach([&](KeyframeId id, const Keyframe& keyframe) {
-    scratch.Put(id, std::make_shared<const Scan>(ScanFromLandmarks(map, keyframe)), keyframe.world_from_camera);
+    scratch.Put(id, std::make_shared<const Scan>(ScanFromLandmarks(map, keyframe, {})), keyframe.world_from_camera);
   });
   EXPECT_FALSE(scratch.Blocks().empty());
   EXPECT_EQ(session.occupancy()->ColorTreeFile(), scratch.ColorTreeFile());
@@ -249,6 +249,44 @@ TEST(OccupancySession, SettingsThatDoNotFitTheSensorAreRefused) {
   KeyframeObservation keyframe{.id = {0}};
   keyframe.features.calibration = kDepthCamera;
   EXPECT_THAT(session.Receive(keyframe), IsFailure(testing::HasSubstr("maximum range")));
+}
+
+OccupancySessionOptions ColorOptions() {
+  OccupancySessionOptions options = SessionOptions();
+  options.with_color = true;
+  return options;
+}
+
+ColorFrame Painted(KeyframeId id) {
+  return {.id = Turn::FrameOf(id),
+          .image = ColorImage(kDepthCamera.width_px, kDepthCamera.height_px, {.red = 200, .green = 100, .blue = 50})};
+}
+
+TEST(OccupancySession, ScansWaitForTheirColors) {
+  Turn turn(ColorOptions());
+  turn.session().Receive(Painted({0}));  // before everything else
+  turn.SendAll(2);
+  turn.session().EndMap();
+  turn.WorkOff();
+  EXPECT_EQ(turn.session().num_without_scan(), 1);
+  EXPECT_FALSE(turn.session().is_done());
+  turn.session().Receive(ColorFrame{.id = Turn::FrameOf({1})});
+  turn.session().Receive(ColorFrame{.id = Turn::FrameOf({0})});  // of a camera that was started again
+  turn.WorkOff();
+  ASSERT_TRUE(turn.session().is_done());
+  const OccupancyMap& map = *turn.session().occupancy();
+  EXPECT_EQ(PointsOf(*map.Find({0})->scan)[0].color, (Rgb{200, 100, 50}));
+  EXPECT_EQ(PointsOf(*map.Find({1})->scan)[0].color, (Rgb{90, 90, 90})) << "there is none, so that it is gray";
+}
+
+TEST(OccupancySession, ScansWhoseColorsDoNotComeAreGray) {
+  Turn turn(ColorOptions());
+  turn.SendAll(2);
+  turn.session().EndMap();
+  turn.session().GiveUp();
+  turn.WorkOff();
+  EXPECT_TRUE(turn.session().is_done());
+  EXPECT_EQ(turn.session().occupancy()->ColorTreeFile(), FromScratch(PosesOf(turn.map())).ColorTreeFile());
 }
 
 }  // namespace

@@ -18,15 +18,27 @@ TEST(Scan, ADepthImageGivesItsPixelsThatHaveDepthAsPoints) {
   frame.depth.row(30)[39] = 2000;
   frame.left.row(30)[39] = 201;
   const OccupancyOptions options{.resolution = 0.01, .max_range = 4.0};
-  const std::vector<ScanPoint> points = PointsOf(ScanFromImages(frame, kDepthCamera, options, 0));
+  const std::vector<ScanPoint> points = PointsOf(ScanFromImages(frame, {}, kDepthCamera, options, 0));
   ASSERT_EQ(points.size(), 1U);
   EXPECT_TRUE(points[0].in_camera.isApprox(2.0 * kDepthCamera.Ray({39, 30})));
-  EXPECT_EQ(points[0].intensity, 201);
+  EXPECT_EQ(points[0].color, (Rgb{201, 201, 201}));
+}
+
+TEST(Scan, PointsHaveTheColorsOfTheImageWhereItHasAny) {
+  const OccupancyOptions options{.resolution = 0.25, .max_range = 4.0};
+  ColorImage color(80, 60, {.red = 9, .green = 8, .blue = 7});
+  color.row(0)[3] = {.red = 1, .green = 2, .blue = 3};
+  const Scan scan = ScanFromImages(DepthFrameOf({}), color, kDepthCamera, options, 0);
+  EXPECT_TRUE(scan.intensity.empty());
+  const std::vector<ScanPoint> points = PointsOf(scan);
+  ASSERT_GT(points.size(), 2U);
+  EXPECT_EQ(points[0].color, (Rgb{9, 8, 7}));
+  EXPECT_EQ(points[1].color, (Rgb{1, 2, 3})) << "the next pixel that is kept";
 }
 
 TEST(Scan, RaysAreNoFartherApartThanAVoxelAtTheMaximumRange) {
   const OccupancyOptions options{.resolution = 0.25, .max_range = 4.0};
-  const Scan scan = ScanFromImages(DepthFrameOf({}), kDepthCamera, options, 0);
+  const Scan scan = ScanFromImages(DepthFrameOf({}), {}, kDepthCamera, options, 0);
   EXPECT_EQ(scan.stride_px, 3);
   EXPECT_LE(scan.stride_px * options.max_range / kDepthCamera.fx_px, options.resolution);
   EXPECT_EQ(scan.depth.width, 27);
@@ -56,7 +68,7 @@ TEST(Scan, AStereoPairIsMatched) {
   EXPECT_DOUBLE_EQ(options.max_range, 100.0 * 0.2 / 6.0);
   EXPECT_DOUBLE_EQ(options.resolution, options.max_range / 160.0);
   EXPECT_EQ(options.min_hits, 2);
-  const std::vector<ScanPoint> points = PointsOf(ScanFromImages(frame, camera, options, 32));
+  const std::vector<ScanPoint> points = PointsOf(ScanFromImages(frame, {}, camera, options, 32));
   ASSERT_GT(points.size(), 5000U);
   const double depth_m = camera.fx_px * camera.baseline_m / kDisparityPx;
   const auto num_right = std::count_if(points.begin(), points.end(), [&](const ScanPoint& point) {
@@ -84,7 +96,7 @@ TEST(Scan, TheLandmarksThatAKeyframeObservesAreItsPoints) {
   std::mt19937 generator(5);
   for (int i = 0; i < 3; ++i) RandomChange(map, generator);
   const Keyframe& keyframe = *map.FindKeyframe({2});
-  const Scan scan = ScanFromLandmarks(map, keyframe);
+  const Scan scan = ScanFromLandmarks(map, keyframe, {});
   size_t num_landmarks = 0;
   for (const LandmarkId id : keyframe.landmarks) num_landmarks += id.valid() ? 1 : 0;
   const std::vector<ScanPoint> points = PointsOf(scan);
@@ -93,6 +105,9 @@ TEST(Scan, TheLandmarksThatAKeyframeObservesAreItsPoints) {
   const auto first =
       std::find_if(keyframe.landmarks.begin(), keyframe.landmarks.end(), [](auto id) { return id.valid(); });
   EXPECT_TRUE((keyframe.world_from_camera * points[0].in_camera).isApprox(map.FindLandmark(*first)->position_in_world));
+  std::vector<Rgb> colors(keyframe.landmarks.size());
+  colors[static_cast<size_t>(first - keyframe.landmarks.begin())] = {.red = 5};
+  EXPECT_EQ(PointsOf(ScanFromLandmarks(map, keyframe, colors))[0].color, Rgb{.red = 5});
 }
 
 TEST(OccupancyOptions, WhatIsGivenIsNotChangedByTheSensor) {

@@ -464,7 +464,8 @@ TEST(StreamSettings, ImagesAndTheMapMayHaveLargerMessages) {
   for (const BusKind bus : {BusKind::kMain, BusKind::kWork, BusKind::kTile}) {
     EXPECT_EQ(settings.MaxMessageBytes(bus), 1400u);
   }
-  for (const BusKind bus : {BusKind::kCamera, BusKind::kMap}) EXPECT_EQ(settings.MaxMessageBytes(bus), 50000u);
+  for (const BusKind bus : {BusKind::kCamera, BusKind::kColor, BusKind::kMap})
+    EXPECT_EQ(settings.MaxMessageBytes(bus), 50000u);
   EXPECT_LT(settings.ReceiverOf(BusKind::kMap).max_asked, settings.ReceiverOf(BusKind::kWork).max_asked);
 }
 

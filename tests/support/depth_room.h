@@ -53,7 +53,7 @@ inline CameraFrame DepthFrameOf(const Rigid3& world_from_camera) {
 
 inline OccupancyMap::SharedScan ScanOfRoom(const Rigid3& world_from_camera) {
   return std::make_shared<const Scan>(
-      ScanFromImages(DepthFrameOf(world_from_camera), kDepthCamera, RoomOptions(), /*max_disparity_px=*/0));
+      ScanFromImages(DepthFrameOf(world_from_camera), {}, kDepthCamera, RoomOptions(), /*max_disparity_px=*/0));
 }
 
 }  // namespace tessera

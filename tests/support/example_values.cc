@@ -73,6 +73,22 @@ bool AreSame(const CameraFrame& a, const CameraFrame& b) {
 }
 
 template <>
+ColorFrame DrawValue<ColorFrame>(std::mt19937& generator, int size) {
+  ColorFrame frame{.id = {Draw(generator, 0, 9999)}, .utime_us = Draw(generator, 0, 1 << 30)};
+  if (size == 0) return frame;
+  frame.image = ColorImage(Draw(generator, 300, 700), Draw(generator, 50, 130));
+  for (Rgb& pixel : frame.image.pixels) {
+    const auto channel = [&] { return static_cast<uint8_t>(generator() % 256); };
+    pixel = {.red = channel(), .green = channel(), .blue = channel()};
+  }
+  return frame;
+}
+template <>
+bool AreSame(const ColorFrame& a, const ColorFrame& b) {
+  return a == b;
+}
+
+template <>
 CameraCalibration DrawValue<CameraCalibration>(std::mt19937& generator, int) {
   return DrawCalibration(generator, Draw(generator, 1, 2000), Draw(generator, 1, 2000));
 }

@@ -22,6 +22,7 @@ bool AreSame(const Value& a, const Value& b);
 template <class Visit>
 void ForEachSentType(Visit visit) {
   visit.template operator()<CameraFrame>();
+  visit.template operator()<ColorFrame>();
   visit.template operator()<CameraCalibration>();
   visit.template operator()<GroundTruthPose>();
   visit.template operator()<EndOfStream>();

@@ -116,6 +116,25 @@ TEST_F(LogTest, GivesBackWhatWasWritten) {
   ExpectWhole(Write());
 }
 
+TEST_F(LogTest, FindsTheColorsOfFramesWhereverTheyStand) {
+  AddRecording();
+  std::mt19937 generator(2);
+  std::vector<ColorFrame> colors;
+  for (const int64_t frame : {0, 2}) {
+    colors.push_back(DrawValue<ColorFrame>(generator, 1));
+    colors.back().id = {frame};
+    Add(kColor, colors.back());
+  }
+  const std::string path = Write();
+  ExpectWhole(path);
+  LogReader reader(path);
+  ASSERT_TRUE(reader.has_colors());
+  EXPECT_EQ(reader.ColorOf({0}), colors[0].image);
+  EXPECT_TRUE(reader.ColorOf({1}).empty());
+  EXPECT_EQ(reader.ColorOf({2}), colors[1].image);
+  EXPECT_TRUE(reader.ColorOf({3}).empty());
+}
+
 TEST_F(LogTest, PutsRightWhatWasRecordedTwiceOrOutOfOrder) {
   AddRecording();
   std::mt19937 generator(2);

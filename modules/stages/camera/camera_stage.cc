@@ -20,6 +20,7 @@ std::unique_ptr<FrameSource> Open(const Settings& settings) {
   options.depth_unit_m = camera.depth_unit_m;
   options.first_frame = camera.first_frame;
   options.last_frame = camera.last_frame;
+  options.with_color = camera.color;
   if (const bool is_device = options.source.starts_with("camera:"); is_device || options.source.starts_with("rtsp")) {
     SourceOptions all = options;
     all.first_frame = 0;
@@ -39,6 +40,7 @@ CameraSessionOptions OptionsFrom(const Settings& settings) {
   options.pace = ParsePace(camera.pace);
   options.pace.lockstep_window = camera.lockstep_window;
   options.is_followed = !settings.Get<BusSettings>().main_url.starts_with("file:");  // a log that is being written
+  options.with_color = camera.color;
   options.num_on_the_way = dispatcher.max_queued_frames + dispatcher.max_frames_in_flight;
   return options;
 }
@@ -51,12 +53,15 @@ CameraStage::CameraStage(StageContext& context)
       calibration_(context.Advertise(kCalibration)),
       ground_truth_(context.Advertise(kGroundTruth)),
       frames_(context.Advertise(kCamera)),
+      colors_(context.Advertise(kColor)),
       end_of_stream_(context.Advertise(kEndOfStream)) {
   for (const std::string& note : session_.source().notes()) context.Info(note);
   num_notes_told_ = session_.source().notes().size();
   if (const std::string loss = session_.source().loss(); !loss.empty()) context.ReportError(loss);
   context.Subscribe(kPose, [this](const PoseEstimate& pose) {
-    return session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us());
+    Result<> marked = session_.MarkTracked(pose.frame, pose.utime_us, context_.now_us());
+    if (marked && pose.is_keyframe) Do(session_.TellColor(pose.frame, pose.utime_us));
+    return marked;
   });
   context.WhenIdle([this] { return Step(); });
   context.Every(std::chrono::seconds(1), [this] {
@@ -100,6 +105,7 @@ bool CameraStage::Step() {
 void CameraStage::Do(const CameraActions& actions) {
   const Overloaded perform{
       [this](const GroundTruthPose& truth) { ground_truth_.Publish(truth); },
+      [this](const ColorFrame& color) { colors_.Publish(color); },
       [this](const CameraFrame& frame) { frames_.Publish(frame); },
       [this](const EndOfStream& end) { end_of_stream_.Publish(end); },
       [this](const Fail& fail) { context_.Fail(fail.sentence, fail.is_user_error ? 2 : 1); },

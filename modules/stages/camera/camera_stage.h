@@ -1,5 +1,5 @@
-// Wiring of the camera: a source of frames and poses in; CALIBRATION, GROUND_TRUTH, CAMERA and END_OF_STREAM out. Which
-// frame is sent when stands in datasets/camera_session.h.
+// Wiring of the camera: a source of frames and poses in; CALIBRATION, GROUND_TRUTH, CAMERA, COLOR and END_OF_STREAM
+// out. Which frame is sent when stands in datasets/camera_session.h.
 #pragma once
 
 #include "datasets/camera_session.h"
@@ -27,6 +27,7 @@ class CameraStage {
   Publisher<CameraCalibration> calibration_;
   Publisher<GroundTruthPose> ground_truth_;
   Publisher<CameraFrame> frames_;
+  Publisher<ColorFrame> colors_;
   Publisher<EndOfStream> end_of_stream_;
 };
 

@@ -31,7 +31,7 @@ struct LiveSource::Shared {
       : options(of_run), calibration(of_camera), clock(of_run.has_host_stamps) {}
 
   // Returns whether more are wanted.
-  bool Take(CameraFrame frame);
+  bool Take(CameraFrame frame, ColorReader color);
   void Say(const std::string& sentence) {
     const std::lock_guard lock(mutex);
     events.push_back(sentence);
@@ -52,6 +52,7 @@ struct LiveSource::Shared {
   std::mutex mutex;
   std::condition_variable changed;
   std::optional<CameraFrame> newest;
+  ColorReader newest_color;
   int64_t newest_captured_us = 0;  // steady clock
   std::vector<std::string> events;
   std::string failure;  // final
@@ -59,13 +60,14 @@ struct LiveSource::Shared {
   bool has_ended = false;
 };
 
-bool LiveSource::Shared::Take(CameraFrame frame) {
+bool LiveSource::Shared::Take(CameraFrame frame, ColorReader color) {
   const int64_t captured_us = clock.CapturedUs(frame.utime_us, NowUs<steady_clock>());
   frame.id = FrameId{next_number++};
   frame.utime_us = captured_us + wall_minus_steady_us;
   const std::lock_guard lock(mutex);
   if (frame.id.value >= options.first_frame) {
     newest = std::move(frame);
+    newest_color = std::move(color);
     newest_captured_us = captured_us;
   }
   changed.notify_all();
@@ -103,7 +105,7 @@ void LiveSource::Run(const std::shared_ptr<Shared>& shared, const Open& open, st
         std::optional<CameraFrame> frame = source->Next();
         if (!frame) break;
         pause = kFirstPause;
-        if (!shared->Take(std::move(*frame))) return;
+        if (!shared->Take(std::move(*frame), source->TakeColor())) return;
       }
     } catch (const std::exception& error) {
       why = error.what();
@@ -140,6 +142,7 @@ std::optional<CameraFrame> LiveSource::Next() {
   shared_->changed.wait(lock, [this] { return shared_->newest || shared_->has_ended; });
   if (!shared_->failure.empty()) throw InputError(shared_->failure);
   std::optional<CameraFrame> frame = std::exchange(shared_->newest, std::nullopt);
+  color_ = std::exchange(shared_->newest_color, nullptr);
   if (frame) frame->age_us = NowUs<steady_clock>() - shared_->newest_captured_us;
   return frame;
 }

@@ -38,6 +38,7 @@ class LiveSource : public FrameSource {
   // Waits if there is none. nullopt after the last wanted frame. Throws InputError if the source came back as another
   // camera.
   std::optional<CameraFrame> Next() override;
+  ColorReader TakeColor() override { return std::exchange(color_, nullptr); }
   bool is_live() const override { return true; }
   const std::vector<std::string>& notes() const override { return notes_; }
 
@@ -52,6 +53,7 @@ class LiveSource : public FrameSource {
   std::vector<GroundTruthPose> ground_truth_;  // none
   std::vector<std::string> notes_;
   std::shared_ptr<Shared> shared_;
+  ColorReader color_;  // of the last frame
 };
 
 }  // namespace tessera

@@ -20,6 +20,7 @@ class LogSource : public FrameSource {
   // Grows as the log is read: whatever was recorded before a frame is here when Next() yields it.
   const std::vector<GroundTruthPose>& ground_truth() const override { return ground_truth_; }
   std::optional<CameraFrame> Next() override;
+  ColorReader TakeColor() override;
   bool is_live() const override { return false; }
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string loss() const override { return reader_.loss(); }
@@ -43,6 +44,7 @@ class LogSource : public FrameSource {
   std::vector<GroundTruthPose> ground_truth_;
   std::deque<CameraFrame> read_ahead_;  // on the way to the calibration
   std::vector<std::string> notes_;
+  FrameId last_;  // that Next() returned
 };
 
 LogSource::LogSource(const SourceOptions& options, const std::string& channel_prefix, bool runs_live)
@@ -115,6 +117,11 @@ std::optional<CameraFrame> LogSource::ReadFrame() {
   return std::nullopt;
 }
 
+ColorReader LogSource::TakeColor() {
+  if (!reader_.has_colors()) return nullptr;
+  return [this, frame = last_] { return reader_.ColorOf(frame); };
+}
+
 std::optional<CameraFrame> LogSource::Next() {
   std::optional<CameraFrame> frame;
   if (read_ahead_.empty()) {
@@ -123,6 +130,7 @@ std::optional<CameraFrame> LogSource::Next() {
     frame = std::move(read_ahead_.front());
     read_ahead_.pop_front();
   }
+  if (frame) last_ = frame->id;
   if (frame && options_.sensor == SensorType::kMono) {
     frame->sensor = SensorType::kMono;
     frame->right = {};

@@ -14,7 +14,7 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
           context.KeepJournal({kPose, kMapDelta, kMapSnapshot, kRemovedKeyframes, kGroundTruth, kEndOfStream}, {})),
       out_dir_(context.settings().Get<EvaluatorSettings>().out_dir),
       map_path_(context.settings().Get<EvaluatorSettings>().save_map),
-      session_(context.name()),
+      session_(context.name(), context.settings().Get<CameraSettings>().color),
       map_(
           context, !context.settings().Get<MapperSettings>().load_map.empty(),
           [this](const MapFollower::Delta& delta) { return session_.Receive(*delta); },
@@ -32,6 +32,9 @@ EvaluatorStage::EvaluatorStage(StageContext& context)
     session_.Receive(removed);
     FinishIfDone();
   });
+  if (context.settings().Get<CameraSettings>().color) {
+    context.Subscribe(kColor, [this](const ColorFrame& color) { session_.Receive(color); });
+  }
   context.Subscribe(kGroundTruth, [this](const GroundTruthPose& truth) { session_.Receive(truth); });
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
     Result<> received = session_.Receive(end, context_.now_us());

@@ -95,7 +95,7 @@ void MapWriterStage::Write() const {
 }
 
 void MapWriterStage::WriteLandmarks() const {
-  WriteFile(path_, PlyFile(replica_, context_.settings().Get<BodySettings>().BaseFromCamera()));
+  WriteFile(path_, PlyFile(replica_, {}, context_.settings().Get<BodySettings>().BaseFromCamera()));
   std::printf("map after delta %lld: %lld keyframes, %lld landmarks, hash %016llx as the mapper's, SHA-256 %s\n",
               static_cast<long long>(replica_.next_delta() - 1), static_cast<long long>(replica_.keyframes().size()),
               static_cast<long long>(replica_.landmarks().size()), static_cast<unsigned long long>(replica_.hash()),

@@ -22,6 +22,7 @@ OccupancySessionOptions OptionsFrom(const Settings& settings) {
                  .prob_miss = occupancy.prob_miss,
                  .prob_min = occupancy.prob_min,
                  .prob_max = occupancy.prob_max};
+  options.with_color = settings.Get<CameraSettings>().color;
   options.max_disparity_px = settings.Get<FeaturesSettings>().max_disparity_px;
   return options;
 }
@@ -44,6 +45,7 @@ OccupancyStage::OccupancyStage(StageContext& context)
       updates_(context.Advertise(kOccupancy)) {
   // Its images are most of what is on the buses.
   if (context.settings().Get<CameraSettings>().sensor != ToString(SensorType::kMono)) Receive(kCamera);
+  if (context.settings().Get<CameraSettings>().color) Receive(kColor);
   Receive(kPose);
   Receive(kRemovedKeyframes);
   context.Subscribe(kKeyframe, [this](const KeyframeObservation& keyframe) {

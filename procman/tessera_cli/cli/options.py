@@ -103,6 +103,12 @@ def add_source_options(parser: Parser) -> None:
     parser.add_argument(
         "--camera", metavar="FILE.yaml", help="calibration, where the source brings none, or instead of its own"
     )
+    parser.add_argument(
+        "--color",
+        action="store_true",
+        help="keep the colors of the images, where they have any: landmarks, map.ply, views, exports and the occupancy "
+        "map show them; --occupancy turns it on; poses and map are the same",
+    )
     add_frames(parser)
     add_settings(parser)
 

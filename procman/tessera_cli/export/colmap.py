@@ -14,16 +14,16 @@ import numpy as np
 from PIL import Image
 
 from tessera_cli.files import replacing, write_text
+from tessera_cli.maps.landmark_colors import UNKNOWN, colors_at
 from tessera_cli.maps.map_replica import CameraModel, Keyframe, MapReplica
 from tessera_cli.maps.poses import conjugate, rotate, rotation_matrices
-from tessera_cli.runs.recorded_images import left_images
+from tessera_cli.runs.recorded_images import best_images
 
 # What a model's folder holds.
 CAMERAS_FILE, IMAGES_FILE, POINTS_FILE, IMAGES = "cameras.txt", "images.txt", "points3D.txt", "images"
 CONTENT = (CAMERAS_FILE, IMAGES_FILE, POINTS_FILE, IMAGES)
 
 HALF_PIXEL = 0.5
-GRAY = 128
 
 
 @dataclass(frozen=True)
@@ -75,30 +75,27 @@ def image_name(keyframe: Keyframe) -> str:
     return f"frame_{keyframe.frame:06d}.png"
 
 
-def write_model(model: Model, folder: Path, grays: np.ndarray | None) -> None:
-    """Text files in `folder`. `grays`: n, 0..255, of the landmarks."""
+def write_model(model: Model, folder: Path, colors: np.ndarray | None) -> None:
+    """Text files in `folder`. `colors`: n x 3 bytes, of the landmarks; None: not known."""
     write_text(folder / CAMERAS_FILE, "".join(_camera_rows(model)))
     write_text(folder / IMAGES_FILE, "".join(_image_rows(model)))
-    values = np.full(len(model.landmarks), GRAY) if grays is None else grays
+    values = np.full((len(model.landmarks), 3), UNKNOWN) if colors is None else colors
     write_text(folder / POINTS_FILE, "".join(_point_rows(model, values)))
 
 
 def write_images(model: Model, folder: Path, log: Path, channel_prefix: str) -> np.ndarray:
-    """The recorded images of the keyframes; returns the gray value of each landmark in the first of its images."""
+    """The recorded images of the keyframes; returns the color of each landmark in the first of its images, n x 3."""
     by_frame = {keyframe.frame: number for number, keyframe in model.keyframes.items()}
     firsts = np.array([track[0] for track in model.tracks]).reshape(-1, 2)
-    grays = np.full(len(model.landmarks), GRAY)
-    for frame, _utime, image in left_images(log, channel_prefix):
-        number = by_frame.get(frame)
-        if number is None:
-            continue
+    colors = np.full((len(model.landmarks), 3), UNKNOWN)
+    for frame, _utime, image in best_images(log, channel_prefix, by_frame):
+        number = by_frame[frame]
         keyframe = model.keyframes[number]
         with replacing(folder / image_name(keyframe)) as written:
             Image.fromarray(image).save(written)
         rows = np.flatnonzero(firsts[:, 0] == number)
-        columns, lines = keyframe.keypoints[firsts[rows, 1]].round().astype(int).T
-        grays[rows] = image[lines.clip(0, image.shape[0] - 1), columns.clip(0, image.shape[1] - 1)]
-    return grays
+        colors[rows] = colors_at(keyframe.keypoints[firsts[rows, 1]], image)
+    return colors
 
 
 def _rotation(keyframe: Keyframe) -> np.ndarray:
@@ -129,11 +126,11 @@ def _image_rows(model: Model) -> Iterator[str]:
         yield " ".join(f"{x:.8g} {y:.8g} {point}" for (x, y), point in zip(pixels.tolist(), points.tolist())) + "\n"
 
 
-def _point_rows(model: Model, grays: np.ndarray) -> Iterator[str]:
+def _point_rows(model: Model, colors: np.ndarray) -> Iterator[str]:
     yield "# POINT3D_ID X Y Z R G B ERROR, then IMAGE_ID POINT2D_IDX of each observation\n"
     rows = zip(
-        model.landmarks.tolist(), model.positions.tolist(), grays.tolist(), model.errors_px.tolist(), model.tracks
+        model.landmarks.tolist(), model.positions.tolist(), colors.tolist(), model.errors_px.tolist(), model.tracks
     )
-    for number, (x, y, z), gray, error, track in rows:
+    for number, (x, y, z), (red, green, blue), error, track in rows:
         seen = " ".join(f"{keyframe + 1} {keypoint}" for keyframe, keypoint in track.tolist())
-        yield f"{number + 1} {x:.9g} {y:.9g} {z:.9g} {gray} {gray} {gray} {error:.6g} {seen}\n"
+        yield f"{number + 1} {x:.9g} {y:.9g} {z:.9g} {red} {green} {blue} {error:.6g} {seen}\n"

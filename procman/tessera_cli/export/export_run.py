@@ -3,10 +3,13 @@
 from argparse import Namespace
 from pathlib import Path
 
+import numpy as np
+
 from tessera_cli.console import say
 from tessera_cli.errors import UserError
 from tessera_cli.export import colmap
 from tessera_cli.files import absolute, replacing, replacing_folder
+from tessera_cli.maps.landmark_colors import read_colors
 from tessera_cli.maps.map_file import read_map_file
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.runs.recorded_images import recording_of
@@ -45,13 +48,15 @@ def _export_colmap(folder: Path, target: Path, result: Result, replica: MapRepli
         raise UserError(f"{target} can't be made: name a new folder in one that exists, or a file that ends in .mcap.")
     if target.is_dir() and any(entry.name not in colmap.CONTENT for entry in target.iterdir()):
         raise UserError(f"{target} has other files than those of a model of COLMAP: name a new folder.")
-    model, grays = colmap.model_of(replica), None
+    model, colors = colmap.model_of(replica), None
     recording = recording_of(folder, result.settings)
     with replacing_folder(target) as written:
         if recording:
             (written / colmap.IMAGES).mkdir()
-            grays = colmap.write_images(model, written / colmap.IMAGES, *recording)
-        colmap.write_model(model, written, grays)
+            colors = colmap.write_images(model, written / colmap.IMAGES, *recording)
+        if (of_map := read_colors(folder, replica)) is not None:
+            colors = of_map[np.isin(replica.landmark_ids(), model.landmarks)]
+        colmap.write_model(model, written, colors)
     error = float(model.errors_px.mean()) if len(model.errors_px) else 0.0
     say(f"{len(model.keyframes)} images, {len(model.landmarks)} points, mean error {error:.2f} px in {target}")
     if len(model.keyframes) < len(replica.keyframes):

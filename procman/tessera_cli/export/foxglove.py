@@ -85,11 +85,16 @@ def poses(time_ns: int, positions: np.ndarray, quaternions_xyzw: np.ndarray) -> 
     return {**stamp(time_ns), "poses": [pose(*both) for both in zip(positions.tolist(), quaternions_xyzw.tolist())]}
 
 
-def point_cloud(time_ns: int, positions: np.ndarray) -> Json:
-    """N x 3."""
+def point_cloud(time_ns: int, positions: np.ndarray, colors: np.ndarray | None) -> Json:
+    """Both n x 3; colors are bytes."""
     fields = [{"name": name, "offset": 4 * index, "type": FLOAT32} for index, name in enumerate("xyz")]
-    data = _base64(positions.astype("<f4").tobytes())
-    return {**stamp(time_ns), "pose": _IDENTITY, "point_stride": 12, "fields": fields, "data": data}
+    points = np.ascontiguousarray(positions, "<f4").view(np.uint8).reshape(len(positions), 12)
+    if colors is not None:
+        names = ("red", "green", "blue", "alpha")
+        fields += [{"name": name, "offset": 12 + index, "type": UINT8} for index, name in enumerate(names)]
+        points = np.hstack([points, colors, np.full((len(colors), 1), 255, np.uint8)])
+    data = _base64(points.tobytes())
+    return {**stamp(time_ns), "pose": _IDENTITY, "point_stride": points.shape[1], "fields": fields, "data": data}
 
 
 def compressed_image(time_ns: int, jpeg: bytes) -> Json:

@@ -10,8 +10,9 @@ from mcap.writer import Writer
 
 from tessera_cli.export import foxglove
 from tessera_cli.export.foxglove import CAMERA, MAP, MAP_FROM_WORLD_XYZW, WORLD, Json
+from tessera_cli.maps.landmark_colors import read_colors
 from tessera_cli.maps.map_replica import MapReplica
-from tessera_cli.runs.recorded_images import left_images, recording_of, to_jpeg
+from tessera_cli.runs.recorded_images import color_images, left_images, recording_of, to_jpeg
 from tessera_cli.runs.run_folder import Frames, Result
 from tessera_cli.runs.trajectories import truth_in_estimate
 
@@ -46,7 +47,7 @@ def entries_of(folder: Path, result: Result, replica: MapReplica) -> Iterator[En
     times_ns = _nanoseconds(result.estimate.timestamps_s)
     first_s = result.frames.times_s[0] if result.frames else result.estimate.timestamps_s[0]
     begin_ns = int(_nanoseconds(np.array([first_s]))[0])
-    yield from _whole_run(begin_ns, result, replica)
+    yield from _whole_run(begin_ns, result, replica, read_colors(folder, replica))
     placed = zip(times_ns.tolist(), result.estimate.positions.tolist(), result.estimate.quaternions_xyzw.tolist())
     for time_ns, position, quaternion in placed:
         pose = {**foxglove.stamp(time_ns), "pose": foxglove.pose(position, quaternion)}
@@ -59,7 +60,7 @@ def entries_of(folder: Path, result: Result, replica: MapReplica) -> Iterator[En
         yield from _images(*recording, replica)
 
 
-def _whole_run(begin_ns: int, result: Result, replica: MapReplica) -> Iterator[Entry]:
+def _whole_run(begin_ns: int, result: Result, replica: MapReplica, colors: np.ndarray | None) -> Iterator[Entry]:
     assert result.estimate is not None
     transform = foxglove.transform(begin_ns, MAP, WORLD, (0, 0, 0), MAP_FROM_WORLD_XYZW)
     yield "/tf", "foxglove.FrameTransform", begin_ns, transform
@@ -75,7 +76,7 @@ def _whole_run(begin_ns: int, result: Result, replica: MapReplica) -> Iterator[E
         quaternions = np.roll([keyframe.rotation_wxyz for keyframe in keyframes], -1, axis=1)
         yield "/keyframes", "foxglove.PosesInFrame", begin_ns, foxglove.poses(begin_ns, positions, quaternions)
     landmarks = replica.positions[replica.landmark_ids()]
-    yield "/map", "foxglove.PointCloud", begin_ns, foxglove.point_cloud(begin_ns, landmarks)
+    yield "/map", "foxglove.PointCloud", begin_ns, foxglove.point_cloud(begin_ns, landmarks, colors)
     if result.grid is not None:
         height = float((estimate.positions @ result.grid.axes[2]).min())
         yield "/occupancy", "foxglove.Grid", begin_ns, foxglove.grid(begin_ns, result.grid, height)
@@ -99,6 +100,9 @@ def _images(log: Path, channel_prefix: str, replica: MapReplica) -> Iterator[Ent
         for camera in cameras:
             yield "/calibration", "foxglove.CameraCalibration", time_ns, foxglove.calibration(time_ns, camera)
         yield "/image", "foxglove.CompressedImage", time_ns, foxglove.compressed_image(time_ns, to_jpeg(image))
+    for _frame, utime_us, image in color_images(log, channel_prefix):
+        time_ns = 1000 * utime_us
+        yield "/image_color", "foxglove.CompressedImage", time_ns, foxglove.compressed_image(time_ns, to_jpeg(image))
 
 
 def _nanoseconds(seconds: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from tessera_cli.maps.occupancy_file import Voxels
 
 # Landmarks between these quantiles of height spread over all colors.
 LOW, HIGH = 0.05, 0.95
-# Gray values between these quantiles are spread from DARKEST to white.
+# Brightnesses between these quantiles are spread from DARKEST to white.
 DARK, BRIGHT, DARKEST, GAMMA = 0.02, 0.98, 30, 0.7
 # From low to high.
 HEIGHT_COLORS = np.array([[66, 94, 168], [60, 160, 160], [150, 200, 110], [250, 220, 120]], float)
@@ -28,15 +28,15 @@ def height_colors(positions: np.ndarray, bounds: tuple[float, float] | None = No
     return np.stack([np.interp(share, steps, column) for column in HEIGHT_COLORS.T], axis=1).astype(np.uint8)
 
 
-def gray_colors(grays: np.ndarray) -> np.ndarray:
-    """N x 3 bytes of n gray values: those that occur spread over all that a screen shows, dark ones made lighter."""
-    if not len(grays):
+def seen_colors(colors: np.ndarray) -> np.ndarray:
+    """N x 3 bytes of n x 3: what occurs spread over all that a screen shows, dark made lighter."""
+    if not len(colors):
         return np.empty((0, 3), np.uint8)
-    low, high = np.quantile(grays, [DARK, BRIGHT])
-    share = np.clip((grays - low) / max(high - low, 1.0), 0, 1) ** GAMMA
-    return np.repeat((DARKEST + (255 - DARKEST) * share).astype(np.uint8)[:, None], 3, axis=1)
+    low, high = np.quantile(colors.mean(axis=1), [DARK, BRIGHT])
+    share = np.clip((colors - low) / max(high - low, 1.0), 0, 1) ** GAMMA
+    return (DARKEST + (255 - DARKEST) * share).astype(np.uint8)
 
 
 def voxel_colors(voxels: Voxels) -> np.ndarray:
     """N x 3 bytes: as the images show them, where that is known, else by height."""
-    return height_colors(voxels.centers) if voxels.grays is None else gray_colors(voxels.grays)
+    return height_colors(voxels.centers) if voxels.colors is None else seen_colors(voxels.colors)

@@ -30,7 +30,7 @@ class Voxels:
     centers: np.ndarray  # n x 3
     sizes: np.ndarray  # n, the sides
     resolution: float  # side of the smallest
-    grays: np.ndarray | None = None  # n, 0 to 255: the mean of what the images show there; None: not known
+    colors: np.ndarray | None = None  # n x 3 bytes: the mean of what the images show there; None: not known
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,13 @@ def read_voxels(path: Path) -> Voxels:
     if not (is_binary or is_colored) or not found or not resolution:
         raise UserError(f"{path}: is no tree of OctoMap, or damaged: make the map again.")
     try:
-        cubes, grays = _binary_cubes(data) if is_binary else _color_cubes(data)
+        cubes, colors = _binary_cubes(data) if is_binary else _color_cubes(data)
         edge = float(resolution[1])
     except ValueError as error:
         raise UserError(f"{path}: is cut off or damaged: copy it again, or make the map again.") from error
     half_width = 1 << (TREE_DEPTH - 1)
     centers = (cubes[:, :3] + cubes[:, 3:] / 2 - half_width) * edge
-    return Voxels(centers, cubes[:, 3] * edge, edge, grays)
+    return Voxels(centers, cubes[:, 3] * edge, edge, colors)
 
 
 def _binary_cubes(data: bytes) -> tuple[np.ndarray, None]:
@@ -72,11 +72,11 @@ def _binary_cubes(data: bytes) -> tuple[np.ndarray, None]:
 
 
 def _color_cubes(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Likewise, and their gray values."""
+    """Likewise, and their colors."""
     nodes = np.frombuffer(data, COLOR_NODE)
     cubes = _cubes((nodes["children"][:, None] >> np.arange(8) & 1).astype(bool))
     is_occupied = (nodes["children"] == 0) & (nodes["log_odds"] >= 0)
-    return cubes[is_occupied], nodes["rgb"][is_occupied, 0]
+    return cubes[is_occupied], nodes["rgb"][is_occupied]
 
 
 def _cubes(has_child: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ def draw_voxels(result: Result) -> Drawing | None:
     label = f"Occupied space, {len(voxels.sizes)} cubes of {edge}, seen from behind the camera."
     note = (
         f"The voxels of the occupancy map ({edge}), seen from behind and above the camera where it saw most of them; "
-        f"their shade is {'their height' if voxels.grays is None else 'what the images show there'}."
+        f"their color is {'their height' if voxels.colors is None else 'what the images show there'}."
     )
     picture = base64.b64encode(_to_jpeg(picture_of(voxels, result.estimate))).decode()
     svg = (

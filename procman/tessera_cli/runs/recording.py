@@ -86,7 +86,7 @@ def _write_log(
     arguments: Namespace, source: Source, log: Path, folder: Path, interrupt: Interrupt, keep_interrupted: bool
 ) -> None:
     url = f"file://{log}?mode=w"
-    assignments = source_assignments(arguments, source) + user_assignments(arguments)
+    assignments = source_assignments(arguments, source, arguments.color) + user_assignments(arguments)
     write_settings([*assignments, f"bus.main_url={url}", f"bus.camera_url={url}"], folder / "settings.yaml")
     logs = LogFolder(folder, f"{folder} is in use.")
     camera = single_process("camera", "camera", RECORDER_STOP_TIMEOUT_S)

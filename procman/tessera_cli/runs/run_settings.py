@@ -33,12 +33,14 @@ RESERVED = {
 }
 
 
-def source_assignments(arguments: Namespace, source: Source) -> list[str]:
+def source_assignments(arguments: Namespace, source: Source, with_color: bool) -> list[str]:
     """Of the camera process. Raises UserError if there is no such calibration file."""
     first, last = arguments.frames
     assignments = [f"camera.sensor={arguments.sensor}", f"camera.first_frame={first}", f"camera.last_frame={last}"]
     if source.has_camera_process:
         assignments.append(f"camera.source={source.text}")
+    if with_color and source.has_camera_process:  # no log player knows which frames become keyframes
+        assignments.append("camera.color=true")
     if arguments.camera:
         assignments.append(f"camera.calibration={_existing_file('--camera', arguments.camera)}")
     return assignments
@@ -48,7 +50,8 @@ def run_assignments(arguments: Namespace, source: Source, out_dir: Path) -> list
     """All settings of a run that differ from the defaults. Raises UserError if options contradict each other."""
     if source.kind == "bus" and arguments.frames != (0, -1):
         raise UserError("--frames has no effect on bus:, whose frames another program sends.")
-    assignments = source_assignments(arguments, source) + _bus_assignments(source, arguments.port)
+    assignments = source_assignments(arguments, source, arguments.color or arguments.occupancy)
+    assignments += _bus_assignments(source, arguments.port)
     run_dir = run_dir_of(key_folder(), bus_url(arguments.port), arguments.prefix)
     assignments += [f"bus.run_dir={run_dir.path}", f"bus.camera_is_member={str(source.has_camera_process).lower()}"]
     assignments.append(f"stream.journal_dir={out_dir / 'journal'}")
@@ -143,7 +146,7 @@ def _bus_assignments(source: Source, port: int) -> list[str]:
     if source.kind == "bus":
         # A log player publishes all channels of its log on one bus.
         main = source.text or bus_url(port)
-        assignments += [f"bus.main_url={main}", f"bus.camera_url={main}"]
+        assignments += [f"bus.{bus}_url={main}" for bus in ("main", "camera", "color")]
     return assignments
 
 

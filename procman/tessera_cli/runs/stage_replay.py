@@ -45,7 +45,7 @@ ANSWER_TIMEOUT_S = 20.0
 # Inputs that may not have arrived are sent again, those of the last so many.
 NUM_REPEATED = 200
 MAX_REPAIRED = 100  # messages of one request
-BUS_KEYS = ("main_url", "camera_url", "work_url", "map_url", "tile_url")
+BUS_KEYS = ("main_url", "camera_url", "color_url", "work_url", "map_url", "tile_url")
 
 
 @dataclass

@@ -13,15 +13,16 @@ from tessera_cli.settings import Settings
 RUN_FOLDER = "evaluator.out_dir"
 # Other settings that name what a stage writes.
 WRITTEN = ("evaluator.save_map", "map_writer.path", "recorder.path")
-# LCM opens other URLs too: a file:// one would be written.
-URLS = ("bus.main_url", "bus.camera_url", "bus.work_url", "bus.map_url", "bus.tile_url")
+# LCM opens other URLs too: a file:// one would be written. Empty ones stand for another bus of these.
+URLS = ("bus.main_url", "bus.camera_url", "bus.color_url", "bus.work_url", "bus.map_url", "bus.tile_url")
+MAY_BE_EMPTY = ("bus.color_url", "bus.map_url")
 
 
 def refuse_writing_elsewhere(values: Settings, allowed: Iterable[Path]) -> None:
     """`values`: all settings of the order; `allowed`: folders of the deputy's own list. Raises UserError."""
     for name in URLS:
-        is_main = name == "bus.map_url" and not _value(values, name)  # then it is the main one
-        if not is_main and not _value(values, name).startswith("udpm://"):
+        is_another = name in MAY_BE_EMPTY and not _value(values, name)
+        if not is_another and not _value(values, name).startswith("udpm://"):
             raise UserError(f"{name} = {_value(values, name)}: an order's bus must be udpm://, which writes no file.")
     folders = [folder.resolve() for folder in allowed]
     if out_dir := _value(values, RUN_FOLDER):

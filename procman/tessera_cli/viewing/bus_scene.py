@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tessera_cli.maps.landmark_colors import LandmarkColors
 from tessera_cli.maps.map_follower import MapFollower, PartJoiner
 from tessera_cli.maps.map_replica import CameraModel
 from tessera_cli.messages import pose_t
@@ -57,6 +58,8 @@ class BusScene:
         self._start_us: int | None = None
         self._moment: Moment | None = None  # of the last frame
         self._images = LeftImages()
+        self._color_images = LeftImages(has_color=True)
+        self._colors = LandmarkColors()
         self._waiting_images: dict[int, np.ndarray] = {}
         self._waiting_features: dict[int, list[Any]] = {}  # keypoints_t, the parts of a frame
         self._joiner = PartJoiner(MAX_WAITING)
@@ -109,6 +112,13 @@ class BusScene:
         if image is not None:
             _keep(self._waiting_images, message.frame, image)
 
+    def on_color(self, message: Any) -> None:
+        """A color_image_t."""
+        image = self._color_images.add(message)
+        if image is not None:
+            self._colors.add(message.frame, image)
+            self._map_changed = True
+
     def on_delta(self, message: Any) -> None:
         """A map_delta_t."""
         self._map_changed |= self.follower.on_delta(message)
@@ -144,7 +154,7 @@ class BusScene:
         replica = self.follower.replica
         if self._map_changed:
             self._map_changed = False
-            yield from map_shapes.shapes_of(replica)
+            yield from map_shapes.shapes_of(replica, self._colors.of(replica))
         yield from self._camera_shape(map_shapes.frustum_depth(replica))
         path = self._path.positions(replica)
         yield Lines(TRAJECTORY, [path] if len(path) > 1 else [], YELLOW, 2.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tessera_cli.maps.colors import height_colors
+from tessera_cli.maps.colors import height_colors, seen_colors
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.maps.poses import rotation_matrices
 from tessera_cli.viewing.scene import (
@@ -26,8 +26,8 @@ FRUSTUM_DEPTH = 0.35
 DEFAULT_FRUSTUM_DEPTH = 0.1
 
 
-def shapes_of(replica: MapReplica) -> list[Shown]:
-    """Nothing of a map without keyframes."""
+def shapes_of(replica: MapReplica, colors: np.ndarray | None) -> list[Shown]:
+    """Nothing of a map without keyframes. `colors`: n x 3 bytes, of the landmarks; None: they show the height."""
     if not replica.keyframes:
         return []
     depth = frustum_depth(replica)
@@ -40,7 +40,7 @@ def shapes_of(replica: MapReplica) -> list[Shown]:
     ]
     pairs = [np.stack([centers[a], centers[b]]) for a, b in covisible_pairs(replica)]
     return [
-        Points(LANDMARKS, positions, height_colors(positions), 1.5),
+        Points(LANDMARKS, positions, height_colors(positions) if colors is None else seen_colors(colors), 1.5),
         Lines(KEYFRAMES, frusta(replica, depth), BLUE, 1.0),
         Lines(COVISIBILITY, pairs, FAINT, 0.6),
         Lines(LOOPS, loops, RED, 3.0),

@@ -10,7 +10,7 @@ import numpy as np
 
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.report.viewpoint import over_the_shoulder
-from tessera_cli.runs.recorded_images import left_images, to_jpeg
+from tessera_cli.runs.recorded_images import best_images, to_jpeg
 from tessera_cli.runs.run_folder import SAME_TIME_S, Frames, Result
 from tessera_cli.runs.trajectories import Trajectory, truth_in_estimate
 from tessera_cli.viewing import keypoints, map_shapes
@@ -57,14 +57,14 @@ def look_of(result: Result, replica: MapReplica) -> Look:
     return Look(plots, image_size, target + size * np.array([0.0, -0.95, -0.7]), target)
 
 
-def scene_of(result: Result, replica: MapReplica) -> Iterator[Shown]:
-    """All but pictures: what is there at once."""
+def scene_of(result: Result, replica: MapReplica, colors: np.ndarray | None) -> Iterator[Shown]:
+    """All but pictures: what is there at once. `colors`: of the landmarks, n x 3 bytes; None: not known."""
     assert result.estimate is not None
     start_s = _start_s(result)
     yield Lines(TRAJECTORY, [result.estimate.positions], YELLOW, 2.0)
     if result.truth is not None and result.error is not None:
         yield Lines(TRUTH, [truth_in_estimate(result.truth, result.error)[0]], GRAY, 2.0)
-    yield from map_shapes.shapes_of(replica)
+    yield from map_shapes.shapes_of(replica, colors)
     if replica.keyframes:
         yield from _camera(result, replica)
     yield _camera_poses(result.estimate, result.frames, start_s)
@@ -88,11 +88,10 @@ def keyframe_keypoints(result: Result, replica: MapReplica) -> Iterator[Shown]:
 
 
 def keyframe_pictures(result: Result, replica: MapReplica, log: Path, channel_prefix: str) -> Iterator[Picture]:
-    """From a recording, the images of the keyframes."""
+    """From a recording, the images of the keyframes, in color where it has that."""
     moments = {moment.frame: moment for moment, _ in keyframe_moments(result, replica)}
-    for frame, _utime, image in left_images(log, channel_prefix):
-        if frame in moments:
-            yield Picture(IMAGE, to_jpeg(image), moments[frame])
+    for frame, _utime, image in best_images(log, channel_prefix, moments):
+        yield Picture(IMAGE, to_jpeg(image), moments[frame])
 
 
 def keyframe_moments(result: Result, replica: MapReplica) -> list[tuple[Moment, int]]:

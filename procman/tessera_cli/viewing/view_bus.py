@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tessera_cli import messages
 from tessera_cli.cluster.keys import key_folder
 from tessera_cli.console import say
-from tessera_cli.constants import CAMERA, LISTEN_S, MAP_ASK_S, POSE, STATUS
+from tessera_cli.constants import CAMERA, COLOR, LISTEN_S, MAP_ASK_S, POSE, STATUS
 from tessera_cli.lcm_bus import Bus, bus_url, is_on_lan, listen, stack_bus_url
 from tessera_cli.maps.map_follower import Request
 from tessera_cli.membership import MEMBERS_ONLY, RunDir, run_dir_of, sign_message
@@ -37,7 +37,7 @@ LOOK = Look((INLIERS_PLOT, LATENCY_PLOT, QUEUES_PLOT))
 def view_bus(arguments: Namespace) -> int:
     lan = is_on_lan(arguments)
     with open_view(arguments, "live") as view:
-        names = ["main", "map"] if arguments.no_images else ["main", "map", "camera"]
+        names = ["main", "map"] if arguments.no_images else ["main", "map", "camera", "color"]
         urls = [stack_bus_url(name, arguments.port, lan) for name in names]
         opened = {url: Bus(url, f"viewer_{os.getpid()}", hears_images=True) for url in urls}
         buses = {name: opened[url] for name, url in zip(names, urls, strict=True)}
@@ -54,7 +54,7 @@ class _Listener:
     """Wires buses, scene and recording."""
 
     def __init__(self, buses: dict[str, Bus], prefix: str, run_dir: RunDir, sink: "RerunSink") -> None:
-        """`buses`: main, map and perhaps camera; two of them may be one."""
+        """`buses`: main, map and perhaps camera and color; two of them may be one."""
         self._buses, self._prefix, self._sink = list(dict.fromkeys(buses.values())), prefix, sink
         self._run_dir = run_dir
         self._scene = BusScene()
@@ -78,6 +78,7 @@ class _Listener:
         self._listen_to(map_bus, "MAP_SNAPSHOT", messages.map_snapshot_t, scene.on_page)
         if "camera" in buses:
             self._listen_to(buses["camera"], CAMERA, messages.camera_image_t, scene.on_image)
+            self._listen_to(buses["color"], COLOR, messages.color_image_t, scene.on_color)
 
     def run(self, view: View) -> None:
         """Until the view is closed."""

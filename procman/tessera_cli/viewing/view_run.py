@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tessera_cli.errors import UserError
 from tessera_cli.files import absolute
+from tessera_cli.maps.landmark_colors import read_colors
 from tessera_cli.maps.map_file import read_map_file
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.runs.recorded_images import recording_of
@@ -31,7 +32,7 @@ def view_run(arguments: Namespace) -> int:
         if result.estimate is None:
             raise UserError(f"{folder}: no frame was tracked, so that there is nothing to show.")
         sink = view.start(look_of(result, replica))
-        for shown in scene_of(result, replica):
+        for shown in scene_of(result, replica, read_colors(folder, replica)):
             sink.show(shown)
         view.tell()
         for shown in later(folder, result, replica):

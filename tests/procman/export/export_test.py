@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 from helpers.made_map import is_close, make_change, make_delta, make_keyframe, make_observation, two_views
 from helpers.made_run import NUM_FRAMES, write_run
 from tessera_cli.export.colmap import model_of, write_model
+from tessera_cli.export.foxglove import point_cloud
 from tessera_cli.export.mcap_file import entries_of, write_mcap
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.runs.run_folder import read_run
@@ -58,6 +59,16 @@ def test_an_mcap_file_holds_the_run(tmp_path: Path) -> None:
     frames = messages["/frame"]
     assert len(frames) == NUM_FRAMES
     assert "pose_time_ms" not in frames[0][2], "the first frame has none, and JSON no word for that"
+
+
+def test_points_are_exported_with_their_colors() -> None:
+    colors = np.array([[1, 2, 3], [4, 5, 6]], np.uint8)
+    cloud = point_cloud(0, np.array([[0.0, 0, 5], [1, 0, 5]]), colors)
+    assert [field["name"] for field in cloud["fields"]] == ["x", "y", "z", "red", "green", "blue", "alpha"]
+    assert [field["offset"] for field in cloud["fields"]] == [0, 4, 8, 12, 13, 14, 15]
+    points = np.frombuffer(base64.b64decode(cloud["data"]), np.uint8).reshape(-1, cloud["point_stride"])
+    assert points[:, 12:].tolist() == [[1, 2, 3, 255], [4, 5, 6, 255]]
+    assert is_close(points[:, :12].copy().view("<f4"), [[0, 0, 5], [1, 0, 5]])
 
 
 def test_up_is_up(tmp_path: Path) -> None:

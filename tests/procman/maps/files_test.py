@@ -67,11 +67,11 @@ def test_occupied_voxels_stand_where_octomap_puts_them(tmp_path: Path) -> None:
     assert read_voxels(tmp_path / "cube.bt").sizes.tolist() == [1.0], "eight voxels that are pruned into one"
 
 
-def color_node(log_odds: float, gray: int, children: int) -> bytes:
-    return struct.pack("<f4B", log_odds, gray, gray, gray, children)
+def color_node(log_odds: float, red: int, children: int) -> bytes:
+    return struct.pack("<f4B", log_odds, red, 7, 9, children)
 
 
-def test_colored_trees_have_gray_values_and_branches_follow_one_another(tmp_path: Path) -> None:
+def test_colored_trees_have_colors_and_branches_follow_one_another(tmp_path: Path) -> None:
     # The last child of the root (the positive octant) and its first one down to the smallest voxels, of which two are
     # there; behind them the octant's last child, a leaf that is free.
     leaves = color_node(0.8, 90, 0) + color_node(1.5, 200, 0)
@@ -80,7 +80,7 @@ def test_colored_trees_have_gray_values_and_branches_follow_one_another(tmp_path
     (tmp_path / "one.ot").write_bytes(OT_HEADER + tree)
     voxels = read_voxels(tmp_path / "one.ot")
     assert voxels.centers.tolist() == [[0.25, 0.25, 0.25], [0.75, 0.25, 0.25]]
-    assert voxels.grays is not None and voxels.grays.tolist() == [90, 200]
+    assert voxels.colors is not None and voxels.colors.tolist() == [[90, 7, 9], [200, 7, 9]]
     for damaged in (tree[:-8], tree[:-3], tree + leaves):
         (tmp_path / "one.ot").write_bytes(OT_HEADER + damaged)
         with pytest.raises(UserError, match=r"one\.ot: is cut off"):

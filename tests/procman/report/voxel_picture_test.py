@@ -22,7 +22,7 @@ def camera_at(position: list[float]) -> Trajectory:
 
 def test_voxels_stand_where_the_eye_sees_them_and_near_ones_hide_far_ones() -> None:
     centers = np.array([[-2.0, 0, 10], [2.0, 0, 10], [-2.4, 0, 12]])
-    voxels = Voxels(centers, np.ones(3), 1.0, np.array([255, 0, 0]))
+    voxels = Voxels(centers, np.ones(3), 1.0, np.repeat([[255], [0], [0]], 3, axis=1))
     picture = picture_of(voxels, camera_at([0, 0, 0])).astype(int)
     is_drawn = (picture != BACKGROUND).any(axis=2)
     assert is_drawn[:, : WIDTH // 2].any() and is_drawn[:, WIDTH // 2 :].any()

@@ -18,7 +18,7 @@ from helpers.made_map import (
     two_views,
 )
 from helpers.made_run import NUM_FRAMES, write_run
-from tessera_cli.maps.colors import DARKEST, HEIGHT_COLORS, gray_colors, height_colors
+from tessera_cli.maps.colors import DARKEST, HEIGHT_COLORS, height_colors, seen_colors
 from tessera_cli.maps.map_replica import MapReplica
 from tessera_cli.messages import message_types as tessera
 from tessera_cli.report.viewpoint import over_the_shoulder
@@ -44,7 +44,7 @@ def by_path(shapes: Any) -> dict[str, Any]:
 
 def test_a_run_shows_path_truth_map_and_curves(tmp_path: Path) -> None:
     result = read_run(write_run(tmp_path / "run"))
-    shown = by_path(scene_of(result, made_replica()))
+    shown = by_path(scene_of(result, made_replica(), None))
     assert result.estimate is not None and result.truth is not None
     assert is_close(shown[scene.TRAJECTORY].strips[0], result.estimate.positions)
     assert len(shown[scene.TRUTH].strips[0]) == NUM_FRAMES
@@ -279,11 +279,13 @@ def test_colors_are_chosen_anew_when_heights_grow() -> None:
     assert low.tolist() == HEIGHT_COLORS[0].tolist() and high.tolist() == [250, 220, 120]
 
 
-def test_gray_values_spread_over_what_a_screen_shows() -> None:
-    colors = gray_colors(np.arange(20, 60))
+def test_colors_spread_over_what_a_screen_shows() -> None:
+    colors = seen_colors(np.arange(20, 60)[:, None].repeat(3, axis=1))
     assert colors[0].tolist() == [DARKEST] * 3 and colors[-1].tolist() == [255] * 3
     assert (np.diff(colors[:, 0].astype(int)) >= 0).all()
-    assert gray_colors(np.empty(0)).shape == (0, 3)
+    assert seen_colors(np.empty((0, 3))).shape == (0, 3)
+    red, gray = seen_colors(np.array([[200, 50, 50], [100, 100, 100]]))
+    assert red[0] > red[1] == red[2] and gray.min() == gray.max(), "hues stay"
 
 
 def make_band(frame: int, y: int, rows: int, value: int, image: int = 0) -> Any:
@@ -303,6 +305,19 @@ def test_images_are_put_together_from_bands() -> None:
     assert image is not None and image[:, 0].tolist() == [10, 10, 10, 10, 20, 20]
     images.add(make_band(4, 0, 4, 10))
     assert images.add(make_band(5, 4, 2, 20)) is None, "a band of another frame was lost"
+
+
+def test_color_images_are_put_together_alike() -> None:
+    message = set_header(tessera.color_image_t())
+    message.frame, message.width, message.height = 3, 4, 6
+    images = LeftImages(has_color=True)
+    assert images.add(received(message)) is None, "the image is gray, which an empty one says"
+    band = message.band
+    band.encoding, band.pixels.width, band.pixels.height = band.RGB8, 4, 6
+    band.data, band.num_bytes = bytes([1, 2, 3] * 24), 72
+    image = images.add(received(message))
+    assert image is not None and image.shape == (6, 4, 3) and image[5, 3].tolist() == [1, 2, 3]
+    assert LeftImages().add(received(message)) is None, "gray images are expected"
 
 
 def test_bands_that_leave_the_image_are_passed_over() -> None:

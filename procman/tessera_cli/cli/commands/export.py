@@ -7,7 +7,8 @@ from tessera_cli.cli.parsing import Commands, add_command
 EPILOG = """\
 OUT.mcap is for Foxglove: path, truth, keyframes, landmarks, transforms, the occupancy grid, curves and, of a run that
 was recorded (run --record), images and calibration. Any other name is a folder for COLMAP's text model (cameras.txt,
-images.txt, points3D.txt, images/), for dense reconstruction or splatting; it has the largest part of the map.
+images.txt, points3D.txt, images/), for dense reconstruction or splatting; it has the largest part of the map. Of a run
+with --color, points are in color, and of one that was also recorded, images of keyframes.
 
 examples:
   procman/tessera export logs/mh01 mh01.mcap
