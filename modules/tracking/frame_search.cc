@@ -76,13 +76,13 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   }
   if (num_inliers < options_.min_last_matches / 2) return false;
   if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_.NumPoints()) return true;
-  return prior != nullptr && turn_rad < kMaxTurnFromPrediction_rad && PriorSigma_px(*prior) < kMaxPriorSigma_px;
+  return prior != nullptr && turn_rad < kMaxTurnFromPrediction_rad && ExpectedSigma_px() < kMaxPriorSigma_px;
 }
 
-// How well a prior knows where the last frame's points are seen, by its translation.
-double FrameSearch::PriorSigma_px(const PosePrior& prior) const {
-  const double sigma = std::sqrt(prior.information.inverse().trace() / 3.0);
-  return view_->calibration().fx_px * sigma / last_.MedianDepth();
+// How well a steady motion knows where the last frame's points are seen: by its way at their depth, and its turn.
+double FrameSearch::ExpectedSigma_px() const {
+  const double sigma = std::sqrt(expected_.prior->information.inverse().trace() / 3.0);
+  return view_->calibration().fx_px * std::hypot(sigma / last_.MedianDepth(), expected_.turn_sigma_rad);
 }
 
 bool FrameSearch::IsWide(const TrackedFrame& frame) const {

@@ -24,6 +24,7 @@ struct ExpectedFrame {
   Rigid3 world_from_camera;
   std::optional<Eigen::Vector3d> step;  // in the last camera's axes, world units; nullopt: no motion is known
   std::optional<PosePrior> prior;       // how well that is known, if the motion was steady
+  double turn_sigma_rad = 0.0;          // how well the turn is, an axis
 };
 
 struct FoundFrame {
@@ -65,7 +66,7 @@ class FrameSearch {
   std::optional<FoundFrame> SearchAnywhere() const;
   std::optional<Rigid3> SearchByPair() const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
-  double PriorSigma_px(const PosePrior& prior) const;
+  double ExpectedSigma_px() const;
   bool IsWide(const TrackedFrame& frame) const;
 
   const Frame view_;

@@ -268,6 +268,7 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
   if (motion) {
     expected.step = world_from_reference.scale * motion->last_from_current.translation;
     expected.prior = PriorOf(*motion);
+    expected.turn_sigma_rad = motion->turn_sigma_rad;
   }
   return expected;
 }
