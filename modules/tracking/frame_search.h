@@ -54,6 +54,9 @@ class FrameSearch {
   const std::optional<FoundFrame>& FindAnywhere();
   // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
+  // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points agree
+  // with a pose: on a wall or a fence they do so in several places. No where the turn is as a steady motion expected.
+  bool PairContradicts(const Rigid3& world_from_camera);
 
  private:
   // The best of several tries.
@@ -67,6 +70,7 @@ class FrameSearch {
   std::optional<Rigid3> SearchByPair() const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
   double ExpectedSigma_px() const;
+  bool IsAsExpected(const Rigid3& world_from_camera) const;
   bool IsWide(const TrackedFrame& frame) const;
 
   const Frame view_;
