@@ -10,7 +10,6 @@
 #include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
 #include "tracking/local_points.h"
-#include "tracking/pair_motion.h"
 
 namespace tessera {
 namespace {
@@ -119,7 +118,7 @@ bool FrameSearch::IsWide(const TrackedFrame& frame) const {
 
 std::optional<Rigid3> FrameSearch::SearchByPair() const {
   if (view_->baseline_m() > 0.0) return std::nullopt;
-  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.step, {});
+  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.way, {});
   return last_from_current ? std::optional(last_.world_from_camera * *last_from_current) : std::nullopt;
 }
 

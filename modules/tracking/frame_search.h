@@ -7,6 +7,7 @@
 #include "geometry/pose_optimization.h"
 #include "matching/point_matching.h"
 #include "tracking/map_replica.h"
+#include "tracking/pair_motion.h"
 
 namespace tessera {
 
@@ -22,7 +23,7 @@ struct FrameSearchOptions {
 // What the motion so far says of a frame.
 struct ExpectedFrame {
   Rigid3 world_from_camera;
-  std::optional<Eigen::Vector3d> step;  // in the last camera's axes, world units; nullopt: no motion is known
+  std::optional<ExpectedWay> way;       // nullopt: no motion is known
   std::optional<PosePrior> prior;       // how well that is known, if the motion was steady
   double turn_sigma_rad = 0.0;          // how well the turn is, an axis
 };

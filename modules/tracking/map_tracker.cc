@@ -267,7 +267,9 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
   ExpectedFrame expected;
   expected.world_from_camera = (world_from_reference * (last_->reference_from_camera * last_from_current)).Pose();
   if (motion) {
-    expected.step = world_from_reference.scale * motion->last_from_current.translation;
+    const double way = motion->last_from_current.translation.norm();
+    const double direction_sigma_rad = std::sqrt(motion->covariance.trace() / 3.0) / way;
+    expected.way = {world_from_reference.scale * SinceLast(view) * motion_.velocity(), direction_sigma_rad};
     expected.prior = PriorOf(*motion);
     expected.turn_sigma_rad = motion->turn_sigma_rad;
   }
