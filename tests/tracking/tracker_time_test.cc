@@ -39,6 +39,28 @@ TEST(LogicalTime, WaitsForWhatIsLate) {
   EXPECT_EQ(time.TakeDeltas({8}).front()->answers, KeyframeId{1});
 }
 
+// Half a second is enough, whatever D says; at least one frame it is.
+TEST(LogicalTime, WaitsForFewerFramesThatComeSlowly) {
+  for (const auto& [interval_us, delay] : {std::pair<int64_t, int64_t>{100'000, 3}, {200'000, 2}, {500'000, 1}, {2'000'000, 1}}) {
+    LogicalTime time(3);
+    time.KeyframeSent({0}, {10}, interval_us);
+    EXPECT_TRUE(time.HasDeltas({9 + delay})) << interval_us;
+    EXPECT_FALSE(time.HasDeltas({10 + delay})) << interval_us;
+  }
+}
+
+// A keyframe that must be seen sooner brings those before it along.
+TEST(LogicalTime, SeesAnswersInTheirOrder) {
+  LogicalTime time(3);
+  time.KeyframeSent({0}, {10}, 100'000);
+  time.KeyframeSent({1}, {11}, 1'000'000);
+  time.Receive(Answer(0));
+  EXPECT_TRUE(time.HasDeltas({11}));
+  EXPECT_FALSE(time.HasDeltas({12}));
+  time.Receive(Answer(1));
+  EXPECT_EQ(time.TakeDeltas({12}).size(), 2U);
+}
+
 // Frames may be dropped: the next one sees all that is due by then, in order.
 TEST(LogicalTime, CatchesUpAfterDroppedFrames) {
   LogicalTime time(2);
