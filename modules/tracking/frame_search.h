@@ -23,9 +23,9 @@ struct FrameSearchOptions {
 // What the motion so far says of a frame.
 struct ExpectedFrame {
   Rigid3 world_from_camera;
-  std::optional<ExpectedWay> way;       // nullopt: no motion is known
-  std::optional<PosePrior> prior;       // how well that is known, if the motion was steady
-  double turn_sigma_rad = 0.0;          // how well the turn is, an axis
+  std::optional<ExpectedWay> way;  // nullopt: no motion is known
+  std::optional<PosePrior> prior;  // how well that is known, if the motion was steady
+  double turn_sigma_rad = 0.0;     // how well the turn is, an axis
 };
 
 struct FoundFrame {
@@ -55,8 +55,9 @@ class FrameSearch {
   const std::optional<FoundFrame>& FindAnywhere();
   // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
-  // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points agree
-  // with a pose: on a wall or a fence they do so in several places. No where the turn is as a steady motion expected.
+  // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points
+  // agree with a pose: on a wall or a fence they do so in several places. No where the turn is as a steady motion
+  // expected.
   bool PairContradicts(const Rigid3& world_from_camera);
 
  private:

@@ -59,8 +59,7 @@ Result<> PairMotionOptions::Check() const {
 }
 
 std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameView& current,
-                                         const std::optional<ExpectedWay>& expected,
-                                         const PairMotionOptions& options) {
+                                         const std::optional<ExpectedWay>& expected, const PairMotionOptions& options) {
   std::vector<Eigen::Vector2d> centers_px;
   for (int i = 0; i < last.view->size(); ++i) centers_px.push_back(last.view->pixel(i));
   const double radius_px = std::hypot(current.calibration().width_px, current.calibration().height_px);

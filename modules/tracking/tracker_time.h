@@ -34,8 +34,8 @@ class TrackerTime {
   void Receive(Delta delta);
   // A snapshot was applied, in place of all deltas up to its number; those after it will be received (again).
   void SkipTo(const MapDelta& snapshot);
-  // A keyframe went out while frame `at` was tracked, which came `interval_us` after the one before (0: there was none).
-  // Keyframes must come in the order of their ids.
+  // A keyframe went out while frame `at` was tracked, which came `interval_us` after the one before (0: there was
+  // none). Keyframes must come in the order of their ids.
   virtual void KeyframeSent(KeyframeId id, FrameId at, int64_t interval_us);
   // Whether all deltas that `frame` must see are there.
   virtual bool HasDeltas(FrameId frame) const = 0;

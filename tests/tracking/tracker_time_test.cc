@@ -41,7 +41,8 @@ TEST(LogicalTime, WaitsForWhatIsLate) {
 
 // Half a second is enough, whatever D says; at least one frame it is.
 TEST(LogicalTime, WaitsForFewerFramesThatComeSlowly) {
-  for (const auto& [interval_us, delay] : {std::pair<int64_t, int64_t>{100'000, 3}, {200'000, 2}, {500'000, 1}, {2'000'000, 1}}) {
+  for (const auto& [interval_us, delay] :
+       {std::pair<int64_t, int64_t>{100'000, 3}, {200'000, 2}, {500'000, 1}, {2'000'000, 1}}) {
     LogicalTime time(3);
     time.KeyframeSent({0}, {10}, interval_us);
     EXPECT_TRUE(time.HasDeltas({9 + delay})) << interval_us;
