@@ -148,8 +148,8 @@ BundleProblem BuildPointProblem(const Map& map, const BundleProblem& window, con
   return problem;
 }
 
-// Whether every keyframe that moved keeps kMinKept of its observations. One that hangs by few landmarks, hardly known in
-// depth, can lose them one by one on its way to a place where robust costs no longer see them.
+// Whether every keyframe that moved keeps kMinKept of its observations. One that hangs by few landmarks, hardly known
+// in depth, can lose them one by one on its way to a place where robust costs no longer see them.
 bool IsCredible(const BundleProblem& problem, const BundleResult& result) {
   std::vector<int> num_seen(problem.poses.size()), num_kept(problem.poses.size());
   for (size_t i = 0; i < problem.observations.size(); ++i) {

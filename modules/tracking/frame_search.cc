@@ -66,7 +66,8 @@ const std::optional<Rigid3>& FrameSearch::PoseByPair() {
 }
 
 bool FrameSearch::PairContradicts(const Rigid3& world_from_camera) {
-  if (IsAsExpected(world_from_camera)) return false;
+  const double turn_sigma_px = view_->calibration().fx_px * expected_.turn_sigma_rad;
+  if (turn_sigma_px < options_.matching.last_radius_px || IsAsExpected(world_from_camera)) return false;
   const std::optional<Rigid3>& by_pair = PoseByPair();
   return by_pair && TurnBetween(*by_pair, world_from_camera) > kMaxTurnFromPair_rad;
 }

@@ -56,8 +56,8 @@ class FrameSearch {
   // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
   // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points
-  // agree with a pose: on a wall or a fence they do so in several places. No where the turn is as a steady motion
-  // expected.
+  // agree with a pose: on a wall or a fence they do so in several places. No where the turn was known beforehand to
+  // the usual window, or is as a steady motion expected: where all trees look alike, two frames know it no better.
   bool PairContradicts(const Rigid3& world_from_camera);
 
  private:
