@@ -79,6 +79,15 @@ MotionEquations Linearize(std::span<const RayPair> pairs, const Rigid3& motion,
   return equations;
 }
 
+// e = basis' d, where the expected direction d lies in the tangent plane of t: weight (sigma / prior's sigma)^2.
+void AddPrior(const DirectionPrior& prior, double sigma, const Rigid3& motion, const Eigen::Matrix<double, 3, 2>& basis,
+              MotionEquations& equations) {
+  const Eigen::Vector3d expected = prior.DirectionFor(motion.rotation);
+  const double weight = (sigma / prior.sigma_rad) * (sigma / prior.sigma_rad);
+  equations.information.bottomRightCorner<2, 2>() += weight * Eigen::Matrix2d::Identity();
+  equations.gradient.tail<2>() -= weight * (basis.transpose() * expected);
+}
+
 }  // namespace
 
 Eigen::Matrix3d EssentialFromMotion(const Rigid3& second_from_first) {
@@ -173,13 +182,19 @@ std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography) {
   return motions;
 }
 
+Eigen::Vector3d DirectionPrior::DirectionFor(const Eigen::Quaterniond& second_from_first) const {
+  return -(ExpSO3(0.5 * LogSO3(second_from_first)) * way.normalized());
+}
+
 RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
-                           int max_iterations) {
+                           const DirectionPrior* prior, double sigma) {
+  constexpr int kMaxIterations = 10;
   RefinedMotion result;
   result.second_from_first = {second_from_first.rotation, second_from_first.translation.normalized()};
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     const Eigen::Matrix<double, 3, 2> basis = TangentBasis(result.second_from_first.translation);
-    const MotionEquations equations = Linearize(pairs, result.second_from_first, basis, corner);
+    MotionEquations equations = Linearize(pairs, result.second_from_first, basis, corner);
+    if (prior != nullptr) AddPrior(*prior, sigma, result.second_from_first, basis, equations);
     result.information = equations.information;
     const Vector5d step = equations.information.ldlt().solve(-equations.gradient);
     if (!step.allFinite() || step.norm() > 1.0) {

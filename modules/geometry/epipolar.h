@@ -40,6 +40,17 @@ std::vector<Rigid3> MotionsFromEssential(const Eigen::Matrix3d& essential);
 // rotation.
 std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography);
 
+// Where the second camera is expected from the first: along `way`, in the axes that a camera has halfway of the turn
+// from the first to the second (so that a camera on a steady curve keeps the same one), whatever the turn is found to
+// be.
+struct DirectionPrior {
+  Eigen::Vector3d way = Eigen::Vector3d::UnitZ();  // of any length
+  double sigma_rad = 0.0;                          // of its direction, an axis
+
+  // The direction of t of second_from_first for this turn.
+  Eigen::Vector3d DirectionFor(const Eigen::Quaterniond& second_from_first) const;
+};
+
 struct RefinedMotion {
   Rigid3 second_from_first;
   // Inverse covariance of (rotation [rad], direction of t in its tangent plane [rad]), for errors of standard deviation
@@ -49,8 +60,10 @@ struct RefinedMotion {
 
 // Refines R and the direction of t of second_from_first by Gauss-Newton on the Huber-weighted Sampson distances, which
 // to first order is the reprojection error minimized over all points as well. `corner` is Huber's, in ray units.
+// `prior` (nullptr: none) takes part with its share of the information, `sigma` being the pairs' standard deviation in
+// ray units: pairs that show a plane, or far points, hardly tell moving aside from turning.
 RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,
-                           int max_iterations = 10);
+                           const DirectionPrior* prior = nullptr, double sigma = 0.0);
 
 // Standard deviation of the direction of translation in its worst direction, radians, for errors of `sigma` ray units;
 // infinite if the pairs don't fix it.

@@ -18,6 +18,7 @@ struct TwoViewProblem {
   std::vector<RayPair> rays;
   double limit_squared = 0.0;  // largest squared error of an inlier, one degree of freedom, in ray units
   double corner = 0.0;         // its root
+  double sigma = 0.0;          // standard deviation of a ray
   TwoViewOptions options;
 };
 
@@ -32,7 +33,8 @@ TwoViewProblem MakeProblem(const CameraCalibration& calibration, std::span<const
                            const TwoViewOptions& options) {
   TwoViewProblem problem;
   problem.options = options;
-  problem.corner = std::sqrt(kChi2LimitOfOne) * options.sigma_px / calibration.fx_px;  // 95 % of chi-square, 1 degree
+  problem.sigma = options.sigma_px / calibration.fx_px;
+  problem.corner = std::sqrt(kChi2LimitOfOne) * problem.sigma;  // 95 % of chi-square, 1 degree
   problem.limit_squared = problem.corner * problem.corner;
   problem.rays.reserve(pairs.size());
   for (const PixelPair& pair : pairs) {
@@ -92,6 +94,7 @@ std::optional<Eigen::Vector3d> GoodPoint(const TwoViewProblem& problem, const Ri
 
 // Refines the motion on the pairs that agree with it, twice, since a better motion finds more of them.
 RefinedMotion RefineOnInliers(const TwoViewProblem& problem, const Rigid3& motion) {
+  const DirectionPrior* prior = problem.options.prior ? &*problem.options.prior : nullptr;
   RefinedMotion refined{motion};
   for (int round = 0; round < 2; ++round) {
     const Eigen::Matrix3d essential = EssentialFromMotion(refined.second_from_first);
@@ -102,7 +105,7 @@ RefinedMotion RefineOnInliers(const TwoViewProblem& problem, const Rigid3& motio
         inliers.push_back(pair);
       }
     }
-    refined = RefineMotion(inliers, refined.second_from_first, problem.corner);
+    refined = RefineMotion(inliers, refined.second_from_first, problem.corner, prior, problem.sigma);
   }
   return refined;
 }
@@ -192,7 +195,7 @@ std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibratio
   const auto best = std::min_element(candidates.begin(), candidates.end(),
                                      [](const auto& a, const auto& b) { return a.cost < b.cost; });
   if (best == candidates.end() || best->num_points < options.min_points || HasRival(problem, candidates, *best) ||
-      DirectionSigma(best->motion, options.sigma_px / calibration.fx_px) > options.max_direction_sigma_rad) {
+      DirectionSigma(best->motion, problem.sigma) > options.max_direction_sigma_rad) {
     return std::nullopt;
   }
   return TwoViewResult{best->motion.second_from_first, best->points, best->num_points};

@@ -10,6 +10,7 @@
 
 #include "core/result.h"
 #include "geometry/camera.h"
+#include "geometry/epipolar.h"
 #include "geometry/keypoint_noise.h"
 #include "geometry/rigid3.h"
 
@@ -28,6 +29,7 @@ struct TwoViewOptions {
   double max_rival_share = 0.75;    // a different motion that explains more than this share of what the best explains
                                     // makes the case ambiguous
   double max_direction_sigma_rad = 0.03;  // of the translation: worse, and turning can't be told from moving aside
+  std::optional<DirectionPrior> prior;    // takes part in the motion, and in how well its direction is known
 
   Result<> Check() const;
 };

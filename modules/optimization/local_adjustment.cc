@@ -11,6 +11,7 @@ namespace {
 
 constexpr size_t kMinConfirmed = 50;  // landmarks of a window
 constexpr double kNoInformation = 1e-6;
+constexpr double kMinKept = 0.5;
 
 void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleProblem& problem) {
   const auto add = [&](KeyframeId id, bool is_fixed) {
@@ -147,6 +148,21 @@ BundleProblem BuildPointProblem(const Map& map, const BundleProblem& window, con
   return problem;
 }
 
+// Whether every keyframe that moved keeps kMinKept of its observations. One that hangs by few landmarks, hardly known
+// in depth, can lose them one by one on its way to a place where robust costs no longer see them.
+bool IsCredible(const BundleProblem& problem, const BundleResult& result) {
+  std::vector<int> num_seen(problem.poses.size()), num_kept(problem.poses.size());
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    const size_t pose = Index(problem.observations[i].pose);
+    ++num_seen[pose];
+    num_kept[pose] += result.is_inlier[i] ? 1 : 0;
+  }
+  for (size_t pose = 0; pose < problem.poses.size(); ++pose) {
+    if (!problem.poses[pose].is_fixed && num_kept[pose] < kMinKept * num_seen[pose]) return false;
+  }
+  return true;
+}
+
 // Landmarks that only keyframe `id` observes move with it.
 void MoveOwnLandmarks(KeyframeId id, const Rigid3& world_from_camera, MapEditor& editor) {
   const Map& map = editor.map();
@@ -209,13 +225,12 @@ void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, 
   const std::vector<LandmarkId> unconfirmed = TakeUnconfirmed(map, window_options.num_confirming, window.landmarks);
   if (window.landmarks.empty()) return;
   const BundleProblem problem = BuildLocalProblem(map, window, window_options, motions);
-  if (const std::optional<BundleResult> result = AdjustBundle(problem, bundle_options)) {
-    WriteBack(problem, *result, editor);
-  }
+  const std::optional<BundleResult> result = AdjustBundle(problem, bundle_options);
+  if (result && IsCredible(problem, *result)) WriteBack(problem, *result, editor);
   const BundleProblem points = BuildPointProblem(map, problem, unconfirmed);
   if (points.points.empty()) return;
-  if (const std::optional<BundleResult> result = AdjustBundle(points, bundle_options))
-    WriteBack(points, *result, editor);
+  if (const std::optional<BundleResult> adjusted = AdjustBundle(points, bundle_options))
+    WriteBack(points, *adjusted, editor);
 }
 
 }  // namespace tessera

@@ -10,7 +10,6 @@
 #include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
 #include "tracking/local_points.h"
-#include "tracking/pair_motion.h"
 
 namespace tessera {
 namespace {
@@ -22,6 +21,11 @@ constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
 // Or if a steady motion knew, to this standard deviation, where points are seen, and the camera turned as predicted. In
 // the open, where points fade from frame to frame, no other try is better.
 constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
+
+// What the essential matrix of two frames may be off by, and a wall seen one window too far is not.
+constexpr double kMaxTurnFromPair_rad = 0.035;
+
+double TurnBetween(const Rigid3& a, const Rigid3& b) { return LogSO3(a.rotation.conjugate() * b.rotation).norm(); }
 
 }  // namespace
 
@@ -61,6 +65,19 @@ const std::optional<Rigid3>& FrameSearch::PoseByPair() {
   return *by_pair_;
 }
 
+bool FrameSearch::PairContradicts(const Rigid3& world_from_camera) {
+  const double turn_sigma_px = view_->calibration().fx_px * expected_.turn_sigma_rad;
+  if (turn_sigma_px < options_.matching.last_radius_px || IsAsExpected(world_from_camera)) return false;
+  const std::optional<Rigid3>& by_pair = PoseByPair();
+  return by_pair && TurnBetween(*by_pair, world_from_camera) > kMaxTurnFromPair_rad;
+}
+
+// Whether a steady motion knew where the last frame's points are seen, and the camera turned as predicted.
+bool FrameSearch::IsAsExpected(const Rigid3& world_from_camera) const {
+  return expected_.prior && ExpectedSigma_px() < kMaxPriorSigma_px &&
+         TurnBetween(expected_.world_from_camera, world_from_camera) < kMaxTurnFromPrediction_rad;
+}
+
 // Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
 bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const {
   ++best.num_tries;
@@ -69,20 +86,20 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   const int num = MatchLast(last_, widening * options_.matching.last_radius_px, options_.matching, frame);
   if (num < options_.min_last_matches) return false;
   const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
-  const double turn_rad = LogSO3(world_from_camera.rotation.conjugate() * frame.world_from_camera.rotation).norm();
+  const bool is_as_expected = prior != nullptr && IsAsExpected(frame.world_from_camera);
   if (num_inliers > best.num_inliers) {
     best.num_inliers = num_inliers;
     best.frame = std::move(frame);
   }
   if (num_inliers < options_.min_last_matches / 2) return false;
   if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_.NumPoints()) return true;
-  return prior != nullptr && turn_rad < kMaxTurnFromPrediction_rad && PriorSigma_px(*prior) < kMaxPriorSigma_px;
+  return is_as_expected;
 }
 
-// How well a prior knows where the last frame's points are seen, by its translation.
-double FrameSearch::PriorSigma_px(const PosePrior& prior) const {
-  const double sigma = std::sqrt(prior.information.inverse().trace() / 3.0);
-  return view_->calibration().fx_px * sigma / last_.MedianDepth();
+// How well a steady motion knows where the last frame's points are seen: by its way at their depth, and its turn.
+double FrameSearch::ExpectedSigma_px() const {
+  const double sigma = std::sqrt(expected_.prior->information.inverse().trace() / 3.0);
+  return view_->calibration().fx_px * std::hypot(sigma / last_.MedianDepth(), expected_.turn_sigma_rad);
 }
 
 bool FrameSearch::IsWide(const TrackedFrame& frame) const {
@@ -102,7 +119,7 @@ bool FrameSearch::IsWide(const TrackedFrame& frame) const {
 
 std::optional<Rigid3> FrameSearch::SearchByPair() const {
   if (view_->baseline_m() > 0.0) return std::nullopt;
-  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.step, {});
+  const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.way, {});
   return last_from_current ? std::optional(last_.world_from_camera * *last_from_current) : std::nullopt;
 }
 

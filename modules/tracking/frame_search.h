@@ -7,6 +7,7 @@
 #include "geometry/pose_optimization.h"
 #include "matching/point_matching.h"
 #include "tracking/map_replica.h"
+#include "tracking/pair_motion.h"
 
 namespace tessera {
 
@@ -22,8 +23,9 @@ struct FrameSearchOptions {
 // What the motion so far says of a frame.
 struct ExpectedFrame {
   Rigid3 world_from_camera;
-  std::optional<Eigen::Vector3d> step;  // in the last camera's axes, world units; nullopt: no motion is known
-  std::optional<PosePrior> prior;       // how well that is known, if the motion was steady
+  std::optional<ExpectedWay> way;  // nullopt: no motion is known
+  std::optional<PosePrior> prior;  // how well that is known, if the motion was steady
+  double turn_sigma_rad = 0.0;     // how well the turn is, an axis
 };
 
 struct FoundFrame {
@@ -53,6 +55,10 @@ class FrameSearch {
   const std::optional<FoundFrame>& FindAnywhere();
   // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
+  // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points
+  // agree with a pose: on a wall or a fence they do so in several places. No where the turn was known beforehand to
+  // the usual window, or is as a steady motion expected: where all trees look alike, two frames know it no better.
+  bool PairContradicts(const Rigid3& world_from_camera);
 
  private:
   // The best of several tries.
@@ -65,7 +71,8 @@ class FrameSearch {
   std::optional<FoundFrame> SearchAnywhere() const;
   std::optional<Rigid3> SearchByPair() const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
-  double PriorSigma_px(const PosePrior& prior) const;
+  double ExpectedSigma_px() const;
+  bool IsAsExpected(const Rigid3& world_from_camera) const;
   bool IsWide(const TrackedFrame& frame) const;
 
   const Frame view_;

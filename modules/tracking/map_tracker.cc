@@ -20,6 +20,7 @@ constexpr double kDriftInterval_s = 0.1;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
 constexpr double kOpenShare = 0.01;      // of a way from keyframe to keyframe: see IsWayOpen()
+constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
@@ -266,8 +267,11 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
   ExpectedFrame expected;
   expected.world_from_camera = (world_from_reference * (last_->reference_from_camera * last_from_current)).Pose();
   if (motion) {
-    expected.step = world_from_reference.scale * motion->last_from_current.translation;
+    const double way = motion->last_from_current.translation.norm();
+    const double direction_sigma_rad = std::sqrt(motion->covariance.trace() / 3.0) / way;
+    expected.way = {world_from_reference.scale * SinceLast(view) * motion_.velocity(), direction_sigma_rad};
     expected.prior = PriorOf(*motion);
+    expected.turn_sigma_rad = motion->turn_sigma_rad;
   }
   return expected;
 }
@@ -295,6 +299,8 @@ bool MapTracker::Localize(const Frame& view, FrameSearch& search) {
   if (pose.optimized.num_inliers < min_inliers) return false;
   // After a loss the greater number of inliers says as much.
   if (!lost_since_us_ && found->is_doubtful && Coverage(around, frame) < kMinCoverage) return false;
+  const bool are_few = pose.optimized.num_inliers < kFewInliers;
+  if (!lost_since_us_ && are_few && search.PairContradicts(frame.world_from_camera)) return false;
   const int num_outliers = num_matches - frame.NumPoints();
   Remember(std::move(frame), pose, found->is_wide);
   last_->num_outliers = num_outliers;

@@ -20,9 +20,14 @@ Eigen::Quaterniond HalfOf(const Eigen::Quaterniond& turn) { return ExpSO3(0.5 * 
 
 }  // namespace
 
+// Of the latest in what the last seconds showed; at first all count alike.
+double MotionModel::MemoryShare(double interval_s) const {
+  return std::max(1.0 - std::exp(-interval_s / kMemory_s), 1.0 / (num_motions_ - 1));
+}
+
 void MotionModel::LearnNoise(const Eigen::Vector3d& measured, double interval_s) {
   const Eigen::Vector3d change = measured - measured_;
-  const double share = std::max(1.0 - std::exp(-interval_s / kMemory_s), 1.0 / (num_motions_ - 1));
+  const double share = MemoryShare(interval_s);
   change_variance_ += share * (change.squaredNorm() / 3.0 - change_variance_);
   change_covariance_ += share * (change.dot(change_) / 3.0 - change_covariance_);
   noise_ = std::clamp(-change_covariance_, 0.0, 0.5 * change_variance_);
@@ -36,8 +41,13 @@ void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& co
   const Eigen::Vector3d measured = middle_from_last * last_from_current.translation / interval_s;
   const Eigen::Matrix3d variance =
       middle_from_last * covariance * middle_from_last.transpose() / (interval_s * interval_s);
-  turn_rate_ = LogSO3(last_from_current.rotation) / interval_s;
+  const Eigen::Vector3d turn_rate = LogSO3(last_from_current.rotation) / interval_s;
   ++num_motions_;
+  if (num_motions_ > 1) {
+    const double squared_change = (turn_rate - turn_rate_).squaredNorm() / 3.0;
+    turn_change_variance_ += MemoryShare(interval_s) * (squared_change - turn_change_variance_);
+  }
+  turn_rate_ = turn_rate;
   if (num_motions_ == 1 || is_carried) {
     velocity_ = measured;
     variance_ = variance;
@@ -54,7 +64,9 @@ void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& co
 }
 
 std::optional<MotionPrediction> MotionModel::Predict(double interval_s) const {
-  return Predict(interval_s, ExpSO3(turn_rate_ * interval_s));
+  std::optional<MotionPrediction> prediction = Predict(interval_s, ExpSO3(turn_rate_ * interval_s));
+  if (prediction) prediction->turn_sigma_rad = interval_s * std::sqrt(turn_change_variance_);
+  return prediction;
 }
 
 std::optional<MotionPrediction> MotionModel::Predict(double interval_s,

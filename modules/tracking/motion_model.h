@@ -11,6 +11,8 @@
 //   and
 //                                                                      adaptive Kalman filtering", 1970)
 //
+// The turn rate goes on as it was, and is as uncertain as it changed from step to step in those seconds.
+//
 // All in time, not in frames, and in the units of the tracker's reference keyframe.
 #pragma once
 
@@ -24,7 +26,8 @@ namespace tessera {
 struct MotionPrediction {
   Rigid3 last_from_current;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of its translation
-  bool is_steady = false;  // enough was seen of a moving camera to hold this against images
+  bool is_steady = false;       // enough was seen of a moving camera to hold this against images
+  double turn_sigma_rad = 0.0;  // of its rotation, an axis, if the camera turns on as it did
 };
 
 class MotionModel {
@@ -44,11 +47,13 @@ class MotionModel {
 
  private:
   void LearnNoise(const Eigen::Vector3d& measured, double interval_s);
+  double MemoryShare(double interval_s) const;
 
   int num_motions_ = 0;
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();   // units/s
   Eigen::Matrix3d variance_ = Eigen::Matrix3d::Zero();   // of it
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  // rad/s, of the last motion
+  double turn_change_variance_ = 0.0;                    // (rad/s)^2, an axis, from motion to motion
   Eigen::Vector3d measured_ = Eigen::Vector3d::Zero();   // the last velocity
   Eigen::Vector3d change_ = Eigen::Vector3d::Zero();     // d, to the one before
   double change_variance_ = 0.0;                         // of d, an axis

@@ -32,18 +32,34 @@ std::optional<double> CommonLength(const std::vector<double>& lengths, const Pai
   return 2 * num_agreeing >= lengths.size() ? std::optional(median) : std::nullopt;
 }
 
+TwoViewOptions WithPrior(const PairMotionOptions& options, const std::optional<ExpectedWay>& expected) {
+  TwoViewOptions two_view = options.two_view;
+  if (!expected) return two_view;
+  two_view.max_direction_sigma_rad = options.max_direction_sigma_rad;
+  two_view.prior = {expected->in_middle, std::max(options.min_expected_sigma_rad, expected->direction_sigma_rad)};
+  return two_view;
+}
+
+// Whether a step of length 1 goes about where it is expected to.
+bool IsAlong(const Rigid3& last_from_current, const ExpectedWay& expected, const PairMotionOptions& options) {
+  const Eigen::Vector3d in_last = ExpSO3(0.5 * LogSO3(last_from_current.rotation)) * expected.in_middle;
+  return last_from_current.translation.dot(in_last) > options.min_cos_expected * in_last.norm();
+}
+
 }  // namespace
 
 Result<> PairMotionOptions::Check() const {
   if (min_known_points < 1 || !(max_depth_spread > 0.0)) {
     return Failed("the length of a step needs at least one known point and a positive spread");
   }
+  if (!(max_direction_sigma_rad > 0.0) || !(min_expected_sigma_rad > 0.0)) {
+    return Failed("the direction of a step needs standard deviations above 0");
+  }
   return two_view.Check();
 }
 
 std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameView& current,
-                                         const std::optional<Eigen::Vector3d>& expected,
-                                         const PairMotionOptions& options) {
+                                         const std::optional<ExpectedWay>& expected, const PairMotionOptions& options) {
   std::vector<Eigen::Vector2d> centers_px;
   for (int i = 0; i < last.view->size(); ++i) centers_px.push_back(last.view->pixel(i));
   const double radius_px = std::hypot(current.calibration().width_px, current.calibration().height_px);
@@ -51,14 +67,14 @@ std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameVi
   std::vector<PixelPair> pairs;
   for (const Match& match : matches) pairs.push_back({last.view->pixel(match.first), current.pixel(match.second)});
   const auto seed = static_cast<uint64_t>(current.features().frame.value);
-  const auto views = EstimateTwoView(current.calibration(), pairs, seed, options.two_view);
+  const auto views = EstimateTwoView(current.calibration(), pairs, seed, WithPrior(options, expected));
   if (!views) return std::nullopt;
   const std::optional<double> length = CommonLength(StepLengths(last, matches, *views), options);
   Rigid3 last_from_current = views->second_from_first.Inverse();
   if (length) {
     last_from_current.translation *= *length;
-  } else if (expected && last_from_current.translation.dot(*expected) > options.min_cos_expected * expected->norm()) {
-    last_from_current.translation *= expected->norm();
+  } else if (expected && IsAlong(last_from_current, *expected, options)) {
+    last_from_current.translation *= expected->in_middle.norm();
   } else {
     return std::nullopt;
   }

@@ -18,19 +18,29 @@ struct PairMotionOptions {
   int min_known_points = 8;        // whose depth tells the length of the step
   double max_depth_spread = 0.25;  // half of them must agree on it within this share
   double min_cos_expected = 0.8;   // without them: between the step and the expected one
+  // Where the motion so far helps to tell turning from moving aside: how well the direction must be known then, and how
+  // well it is at best.
+  double max_direction_sigma_rad = 0.15;
+  double min_expected_sigma_rad = 0.1;
 
   Result<> Check() const;
 };
 
+// Where the motion so far leads, whatever the turn.
+struct ExpectedWay {
+  Eigen::Vector3d in_middle;         // in the axes of a camera halfway of the turn, world units
+  double direction_sigma_rad = 0.0;  // an axis
+};
+
 // last_from_current, in world units: rotation and direction from the essential matrix (EstimateTwoView), the length as
 // the known points that `last` sees have it: the median over them of their depth by the depth of unit length. Where
-// they are too few or disagree, the length of `expected`, the step (in the last camera's axes) by the motion so far, if
-// the direction is about that one's. nullopt if there is neither, or the two views don't determine the motion.
+// they are too few or disagree, the length of `expected`, if the direction is about that one's. nullopt if there is
+// neither, or the two views don't determine the motion. They need not do so by themselves: walls at either side of a
+// corner leave open how much of a step is a turn, by more than `expected` does.
 //
 // A rival motion doesn't refuse it, as it does at the start: the known points or the motion so far confirm the best
 // one.
 std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameView& current,
-                                         const std::optional<Eigen::Vector3d>& expected,
-                                         const PairMotionOptions& options);
+                                         const std::optional<ExpectedWay>& expected, const PairMotionOptions& options);
 
 }  // namespace tessera

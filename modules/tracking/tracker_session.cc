@@ -96,15 +96,17 @@ std::optional<MapTrackingResult> TrackerSession::Track(const FeatureFrame& featu
 
 void TrackerSession::Publish(MapTrackingResult result, TrackerActions& actions) {
   PoseEstimate& pose = result.pose;
+  const int64_t interval_us = last_tracked_.valid() ? pose.utime_us - last_utime_us_ : 0;
   pose.num_deltas = tracker_.map().next_delta();
   pose.is_live = time_->is_live();
   for (KeyframeObservation& keyframe : result.keyframes) {
     keyframe.num_deltas = pose.num_deltas;
-    time_->KeyframeSent(keyframe.id, pose.frame);
+    time_->KeyframeSent(keyframe.id, pose.frame, interval_us);
     actions.emplace_back(std::move(keyframe));
     ++num_keyframes_;
   }
   last_tracked_ = pose.frame;
+  last_utime_us_ = pose.utime_us;
   actions.emplace_back(std::move(pose));
 }
 

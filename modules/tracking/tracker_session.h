@@ -77,6 +77,7 @@ class TrackerSession {
   std::deque<FeatureFrame> waiting_;
   FrameId last_received_;
   FrameId last_tracked_;
+  int64_t last_utime_us_ = 0;       // of that frame
   RelocalizationRequest question_;  // the last that was sent
   int64_t num_keyframes_ = 0;
   std::optional<EndOfStream> features_end_;

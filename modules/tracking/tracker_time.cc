@@ -1,5 +1,6 @@
 #include "tracking/tracker_time.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace tessera {
@@ -17,7 +18,7 @@ void TrackerTime::SkipTo(const MapDelta& snapshot) {
   answered_ = snapshot.answers;
 }
 
-void TrackerTime::KeyframeSent(KeyframeId id, FrameId /*at*/) { last_sent_ = id; }
+void TrackerTime::KeyframeSent(KeyframeId id, FrameId /*at*/, int64_t /*interval_us*/) { last_sent_ = id; }
 
 std::vector<TrackerTime::Delta> TrackerTime::TakeDeltas(FrameId frame) {
   std::vector<Delta> deltas;
@@ -37,9 +38,11 @@ void TrackerTime::Receive(const RelocalizationAnswer& answer) {
   if (!answer_ || answer.frame > answer_->frame) answer_ = answer;
 }
 
-void LogicalTime::KeyframeSent(KeyframeId id, FrameId at) {
-  TrackerTime::KeyframeSent(id, at);
-  sent_.push_back({id, at});
+void LogicalTime::KeyframeSent(KeyframeId id, FrameId at, int64_t interval_us) {
+  TrackerTime::KeyframeSent(id, at, interval_us);
+  int64_t delay_frames = map_delay_frames_;
+  if (interval_us > 0) delay_frames = std::clamp<int64_t>(kMaxMapDelay_us / interval_us, 1, map_delay_frames_);
+  sent_.push_back({id, {at.value + delay_frames}});
 }
 
 std::vector<TrackerTime::Delta> LogicalTime::TakeDeltas(FrameId frame) {
@@ -56,14 +59,13 @@ const RelocalizationAnswer* LogicalTime::TakeAnswer(FrameId frame) {
 KeyframeId LogicalTime::LastDue(FrameId frame) const {
   KeyframeId due = past_due_;
   for (const Sent& sent : sent_) {
-    if (sent.at.value > frame.value - map_delay_frames_) break;
-    due = sent.id;
+    if (sent.due <= frame) due = sent.id;
   }
   return due;
 }
 
-void LiveTime::KeyframeSent(KeyframeId id, FrameId at) {
-  TrackerTime::KeyframeSent(id, at);
+void LiveTime::KeyframeSent(KeyframeId id, FrameId at, int64_t interval_us) {
+  TrackerTime::KeyframeSent(id, at, interval_us);
   if (at != last_at_) first_of_last_ = id;
   last_at_ = at;
 }

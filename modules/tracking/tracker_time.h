@@ -2,7 +2,8 @@
 //
 //   LogicalTime  Frame f sees exactly the deltas that answer keyframes of frames <= f - D, and the answer to its own
 //                question. What comes early is held back, what is missing is waited for: the same input gives the same
-//                result.
+//                result. Of frames that come slowly, D is fewer: at two images a second, three frames are a turn
+//                around a corner, and nothing of the map that the last one has seen is left in view.
 //   LiveTime     A frame sees what is there, but for the answer to one of several keyframes of one frame, which comes
 //                with the others: mono's first points belong to two. It never waits; an answer serves the frame that is
 //                next when it comes.
@@ -33,8 +34,9 @@ class TrackerTime {
   void Receive(Delta delta);
   // A snapshot was applied, in place of all deltas up to its number; those after it will be received (again).
   void SkipTo(const MapDelta& snapshot);
-  // A keyframe went out while frame `at` was tracked. Keyframes must come in the order of their ids.
-  virtual void KeyframeSent(KeyframeId id, FrameId at);
+  // A keyframe went out while frame `at` was tracked, which came `interval_us` after the one before (0: there was
+  // none). Keyframes must come in the order of their ids.
+  virtual void KeyframeSent(KeyframeId id, FrameId at, int64_t interval_us);
   // Whether all deltas that `frame` must see are there.
   virtual bool HasDeltas(FrameId frame) const = 0;
   // Takes out the deltas that `frame` sees and no frame before it saw, in order. HasDeltas(frame) must hold.
@@ -72,11 +74,12 @@ class TrackerTime {
 
 class LogicalTime : public TrackerTime {
  public:
-  // D = `map_delay_frames` >= 1. `may_ask`: frames may ask where they were taken, each once.
+  // D = `map_delay_frames` >= 1, but no more frames than come in kMaxMapDelay_us, if that is one at least. `may_ask`:
+  // frames may ask where they were taken, each once.
   explicit LogicalTime(int64_t map_delay_frames, bool may_ask = true)
       : map_delay_frames_(map_delay_frames), may_ask_(may_ask) {}
 
-  void KeyframeSent(KeyframeId id, FrameId at) override;
+  void KeyframeSent(KeyframeId id, FrameId at, int64_t interval_us) override;
   bool HasDeltas(FrameId frame) const override { return answered_ >= LastDue(frame); }
   std::vector<Delta> TakeDeltas(FrameId frame) override;
   bool MayAsk(FrameId frame) const override { return may_ask_ && asked_ != frame; }
@@ -84,13 +87,15 @@ class LogicalTime : public TrackerTime {
   const RelocalizationAnswer* TakeAnswer(FrameId frame) override;
   bool is_live() const override { return false; }
 
+  static constexpr int64_t kMaxMapDelay_us = 500'000;
+
  private:
   struct Sent {
     KeyframeId id;
-    FrameId at;
+    FrameId due;  // the first frame that sees its answer
   };
   bool IsDue(const MapDelta& delta, FrameId frame) const override { return delta.answers <= LastDue(frame); }
-  // The last keyframe of the frames up to `frame` - D.
+  // The last keyframe whose answer `frame` sees.
   KeyframeId LastDue(FrameId frame) const;
 
   const int64_t map_delay_frames_;
@@ -104,7 +109,7 @@ class LiveTime : public TrackerTime {
   // `may_ask`: a frame may ask where it was taken, if no question is open.
   explicit LiveTime(bool may_ask = true) : may_ask_(may_ask) {}
 
-  void KeyframeSent(KeyframeId id, FrameId at) override;
+  void KeyframeSent(KeyframeId id, FrameId at, int64_t interval_us) override;
   bool HasDeltas(FrameId) const override { return true; }
   bool MayAsk(FrameId) const override { return may_ask_ && !asked_.valid(); }
   bool AwaitsAnswer(FrameId) const override { return false; }

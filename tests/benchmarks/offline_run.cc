@@ -7,6 +7,7 @@
 #include <ctime>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "core/errors.h"
 #include "features/extractor.h"
@@ -141,7 +142,9 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
   LogicalTime time(map_delay_frames);
   Mapping mapping(run);
   bool was_lost = false;
+  int64_t previous_us = frames.empty() ? 0 : frames.front().utime_us;
   for (const FeatureFrame& features : frames) {
+    const int64_t interval_us = features.utime_us - std::exchange(previous_us, features.utime_us);
     const MapTrackingResult result = Measure(run.track_ms, [&] {
       for (const auto& delta : time.TakeDeltas(features.frame)) {
         ThrowIfFailed<InputError>(tracker.ApplyDelta(*delta));
@@ -154,7 +157,7 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
     run.num_failures += is_lost && !was_lost ? 1 : 0;
     was_lost = is_lost;
     for (const KeyframeObservation& keyframe : result.keyframes) {
-      time.KeyframeSent(keyframe.id, features.frame);
+      time.KeyframeSent(keyframe.id, features.frame, interval_us);
       time.Receive(mapping.Process(keyframe));
     }
   }

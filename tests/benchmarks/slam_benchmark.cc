@@ -33,7 +33,7 @@ Record MakeRecord(int num_features) {
     record.deltas.push_back(time.TakeDeltas(frame.frame));
     for (const auto& delta : record.deltas.back()) (void)tracker.ApplyDelta(*delta);
     for (const KeyframeObservation& keyframe : tracker.Track(frame).keyframes) {
-      time.KeyframeSent(keyframe.id, frame.frame);
+      time.KeyframeSent(keyframe.id, frame.frame, 0);
       time.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
       record.keyframes.push_back(keyframe);
     }

@@ -78,6 +78,26 @@ TEST(SampsonDistance, IsTheDistanceFromTheNearestAllowedPair) {
   EXPECT_NEAR(std::abs(SampsonDistance(essential, pair)), 1e-4 * share, 1e-7);
 }
 
+// Without pairs the prior alone counts; with many it hardly does.
+TEST(RefineMotion, APriorFillsInWhatPairsLeaveOpen) {
+  const Rigid3 motion{ExpSO3({0.0, 0.2, 0.0}), Eigen::Vector3d(0.1, 0.0, -1.0).normalized()};
+  const DirectionPrior prior{{0.3, 0.0, 1.0}, 0.1};
+  const RefinedMotion by_prior = RefineMotion({}, motion, 0.003, &prior, 0.001);
+  EXPECT_LT((by_prior.second_from_first.translation - prior.DirectionFor(motion.rotation)).norm(), 1e-6);
+  EXPECT_NEAR(by_prior.information(4, 4), 1e-4, 1e-12);
+  const auto rays = Rays(Scene::kGeneral, motion, 100);
+  const RefinedMotion by_pairs = RefineMotion(rays, motion, 0.003, &prior, 0.001);
+  EXPECT_LT((by_pairs.second_from_first.translation - motion.translation).norm(), 0.005);
+}
+
+TEST(DirectionPrior, IsTheChordOfTheTurn) {
+  // A camera that goes ahead while it turns by 0.4 to the right ends up to the right of ahead by half of that.
+  const DirectionPrior prior{{0.0, 0.0, 2.0}, 0.1};
+  const Rigid3 second_from_first{ExpSO3({0.0, -0.4, 0.0}), prior.DirectionFor(ExpSO3({0.0, -0.4, 0.0}))};
+  const Eigen::Vector3d way_in_first = second_from_first.Inverse().translation;
+  EXPECT_NEAR(std::atan2(way_in_first.x(), way_in_first.z()), 0.2, 1e-12);
+}
+
 TEST(RefineMotion, FindsTheMotionFromAWrongStart) {
   const std::vector<RayPair> rays = Rays(Scene::kGeneral, kMotion, 100);
   const Rigid3 start{kMotion.rotation * ExpSO3({0.01, 0.01, -0.01}), {0.95, 0.05, -0.25}};

@@ -70,6 +70,19 @@ TEST(EstimateTwoView, IsRightOrRefusesOnAPlane) {
   }
 }
 
+// Noisy pairs of a plane leave open how much of a step aside is a turn; where the camera is expected decides that.
+TEST(EstimateTwoView, AnExpectedDirectionTellsTurningFromMovingAside) {
+  const Rigid3 motion{ExpSO3({0.0, -0.5, 0.0}), {0.2, 0.0, -1.1}};
+  const auto pairs = MakePairs(MakePoints(Scene::kPlane, motion, 300), motion, 0.5, 5);
+  const Eigen::Vector3d way = -(ExpSO3(0.5 * LogSO3(motion.rotation)).conjugate() * motion.translation);
+  TwoViewOptions options{.max_rival_share = 1.0, .max_direction_sigma_rad = 0.15};
+  options.prior = {ExpSO3({0.0, 0.05, 0.0}) * way, 0.1};
+  const auto result = EstimateTwoView(MakeCamera(), pairs, 5, options);
+  ASSERT_TRUE(result.has_value());
+  EXPECT_LT(RotationError(result->second_from_first, motion), 0.02);
+  EXPECT_LT(DirectionError(result->second_from_first, motion), 0.1);
+}
+
 TEST(EstimateTwoView, RefusesARotationOnTheSpot) {
   const Rigid3 turn{ExpSO3({0.0, 0.06, 0.0}), {0.0, 0.0, 0.0}};
   for (const Scene scene : {Scene::kGeneral, Scene::kPlane}) {

@@ -36,6 +36,19 @@ class LocalAdjustment : public testing::Test {
     edit(editor);
     (void)editor.Finish({kNum - 1});
   }
+  // This share of what the last keyframe observes is seen at another one's keypoint.
+  static void ShiftObservations(double share, MapEditor& editor) {
+    std::vector<std::pair<LandmarkId, Observation>> seen;
+    const Keyframe& last = *editor.map().FindKeyframe({kNum - 1});
+    for (size_t i = 0; i < last.landmarks.size(); ++i) {
+      if (last.landmarks[i].valid()) seen.push_back({last.landmarks[i], {{kNum - 1}, static_cast<int32_t>(i)}});
+    }
+    seen.resize(static_cast<size_t>(share * static_cast<double>(seen.size())));
+    for (const auto& [landmark, observation] : seen) editor.RemoveObservation(landmark, observation);
+    for (size_t i = 0; i < seen.size(); ++i) {
+      editor.AddObservation(seen[i].first, seen[(i + seen.size() / 2) % seen.size()].second);
+    }
+  }
   const Map& map() const { return planted_->map(); }
   static const BundlePose& PoseOf(const BundleProblem& problem, KeyframeId id) {
     return *std::find_if(problem.poses.begin(), problem.poses.end(), [&](const BundlePose& p) { return p.id == id; });
@@ -71,6 +84,18 @@ TEST_F(LocalAdjustment, TheRootIsFixedAndMonoKeepsAScale) {
     ASSERT_EQ(problem.poses.size(), static_cast<size_t>(kNum));
     for (const BundlePose& pose : problem.poses) EXPECT_EQ(pose.is_fixed, pose.id == KeyframeId{0});
     EXPECT_EQ(problem.scale_pose, sensor == SensorType::kMono ? 1 : -1);
+  }
+}
+
+// A solution that takes half of its observations from a keyframe has lost it, whatever its costs.
+TEST_F(LocalAdjustment, IsNotTakenWhereItLosesAKeyframe) {
+  for (const double share : {0.3, 0.7}) {
+    Plant(SensorType::kMono);
+    Change([&](MapEditor& editor) { ShiftObservations(share, editor); });
+    const Rigid3 before = map().FindKeyframe({kNum - 2})->world_from_camera;
+    Change([](MapEditor& editor) { AdjustLocally({kNum - 1}, FourInner(false), {}, {}, editor); });
+    const Rigid3& after = map().FindKeyframe({kNum - 2})->world_from_camera;
+    EXPECT_EQ(after.translation == before.translation, share > 0.5) << share;
   }
 }
 

@@ -64,6 +64,25 @@ TEST_F(FrameSearchTest, BelievesASteadyMotionThatFewPointsAgreeWith) {
   EXPECT_FALSE(found->is_doubtful);
 }
 
+TEST_F(FrameSearchTest, DoesNotBelieveATurnThatIsNotSteady) {
+  const double sigma_m = 0.005;
+  const PosePrior prior{truth_.Inverse(), Eigen::Matrix3d::Identity() / (sigma_m * sigma_m)};
+  const ExpectedFrame expected{.world_from_camera = truth_, .prior = prior, .turn_sigma_rad = 0.1};
+  const auto found = Follow(Faded(Take(), 6), expected);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_TRUE(found->is_doubtful);
+}
+
+TEST_F(FrameSearchTest, TwoFramesByThemselvesContradictAnotherTurn) {
+  const Rigid3 turned = truth_ * Rigid3{ExpSO3({0.0, 0.1, 0.0}), Eigen::Vector3d::Zero()};
+  FrameSearch search(ViewOf(Take()), last_, {.world_from_camera = turned, .turn_sigma_rad = 0.1}, replica_, options_);
+  EXPECT_FALSE(search.PairContradicts(truth_));
+  EXPECT_TRUE(search.PairContradicts(turned));
+  // A turn that was known beforehand is known better.
+  FrameSearch steady(ViewOf(Take()), last_, {.world_from_camera = turned, .turn_sigma_rad = 0.001}, replica_, options_);
+  EXPECT_FALSE(steady.PairContradicts(turned));
+}
+
 TEST_F(FrameSearchTest, FindsNothingWhereNothingIsSeenAgain) {
   const FeatureFrame strange = Faded(Take(), 1000000);
   EXPECT_FALSE(Follow(strange, {.world_from_camera = truth_}).has_value());

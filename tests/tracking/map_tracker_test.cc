@@ -30,7 +30,7 @@ void Follow(SyntheticWorld world, int64_t num_frames, int64_t delay_frames, cons
     const MapTrackingResult result = tracker.Track(features);
     outcome.poses.push_back(result.pose);
     for (const KeyframeObservation& keyframe : result.keyframes) {
-      time.KeyframeSent(keyframe.id, features.frame);
+      time.KeyframeSent(keyframe.id, features.frame, 0);
       time.Receive(std::make_shared<const MapDelta>(outcome.mapper.Process(keyframe)));
       outcome.keyframes.push_back(keyframe);
     }
@@ -128,7 +128,7 @@ TEST(MapTracker, FollowsMonoThroughWideStepsAndTurns) {
       EXPECT_EQ(result.pose.state, TrackingState::kTracked) << step;
     }
     for (const KeyframeObservation& keyframe : result.keyframes) {
-      time.KeyframeSent(keyframe.id, features.frame);
+      time.KeyframeSent(keyframe.id, features.frame, 0);
       time.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
     }
   }

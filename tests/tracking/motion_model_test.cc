@@ -52,6 +52,15 @@ TEST(MotionModel, IsAsUncertainAsTheLastSecondsWereRestless) {
   EXPECT_GT(restless->covariance.trace(), 20.0 * calm->covariance.trace());
 }
 
+// A walker's turns come and go between two images: how the last one turned says little of the next.
+TEST(MotionModel, KnowsATurnAsWellAsTheLastOnesWereSteady) {
+  MotionModel walker;
+  for (int i = 0; i < 30; ++i)
+    walker.Add({ExpSO3({0.0, i % 2 == 0 ? 0.1 : 0.2, 0.0}), {0.0, 0.0, 1.0}}, kCovariance, 0.5);
+  EXPECT_NEAR(walker.Predict(0.5)->turn_sigma_rad, 0.1 / std::sqrt(3.0), 1e-9);
+  EXPECT_LT(Driven(0.5).Predict(kInterval)->turn_sigma_rad, 1e-9);
+}
+
 TEST(MotionModel, TellsNoiseOfPosesFromMotion) {
   // Poses that are 10 mm off, of a camera of constant velocity: the filter knows the velocity better than each of them.
   const auto noisy = Driven(0.5, 1e-2, 100).Predict(kInterval);

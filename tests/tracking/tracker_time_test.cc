@@ -15,7 +15,7 @@ TrackerTime::Delta Answer(int64_t keyframe) {
 
 TEST(LogicalTime, HoldsBackWhatComesEarly) {
   LogicalTime time(3);
-  time.KeyframeSent({0}, {10});
+  time.KeyframeSent({0}, {10}, 0);
   time.Receive(Answer(0));
   for (int64_t frame = 11; frame < 13; ++frame) {
     EXPECT_TRUE(time.HasDeltas({frame}));
@@ -27,8 +27,8 @@ TEST(LogicalTime, HoldsBackWhatComesEarly) {
 
 TEST(LogicalTime, WaitsForWhatIsLate) {
   LogicalTime time(2);
-  time.KeyframeSent({0}, {5});
-  time.KeyframeSent({1}, {6});
+  time.KeyframeSent({0}, {5}, 0);
+  time.KeyframeSent({1}, {6}, 0);
   EXPECT_TRUE(time.HasDeltas({6}));
   EXPECT_FALSE(time.HasDeltas({7}));
   time.Receive(Answer(0));
@@ -39,11 +39,34 @@ TEST(LogicalTime, WaitsForWhatIsLate) {
   EXPECT_EQ(time.TakeDeltas({8}).front()->answers, KeyframeId{1});
 }
 
+// Half a second is enough, whatever D says; at least one frame it is.
+TEST(LogicalTime, WaitsForFewerFramesThatComeSlowly) {
+  for (const auto& [interval_us, delay] :
+       {std::pair<int64_t, int64_t>{100'000, 3}, {200'000, 2}, {500'000, 1}, {2'000'000, 1}}) {
+    LogicalTime time(3);
+    time.KeyframeSent({0}, {10}, interval_us);
+    EXPECT_TRUE(time.HasDeltas({9 + delay})) << interval_us;
+    EXPECT_FALSE(time.HasDeltas({10 + delay})) << interval_us;
+  }
+}
+
+// A keyframe that must be seen sooner brings those before it along.
+TEST(LogicalTime, SeesAnswersInTheirOrder) {
+  LogicalTime time(3);
+  time.KeyframeSent({0}, {10}, 100'000);
+  time.KeyframeSent({1}, {11}, 1'000'000);
+  time.Receive(Answer(0));
+  EXPECT_TRUE(time.HasDeltas({11}));
+  EXPECT_FALSE(time.HasDeltas({12}));
+  time.Receive(Answer(1));
+  EXPECT_EQ(time.TakeDeltas({12}).size(), 2U);
+}
+
 // Frames may be dropped: the next one sees all that is due by then, in order.
 TEST(LogicalTime, CatchesUpAfterDroppedFrames) {
   LogicalTime time(2);
   for (int64_t k = 0; k < 3; ++k) {
-    time.KeyframeSent({k}, {k});
+    time.KeyframeSent({k}, {k}, 0);
     time.Receive(Answer(k));
     time.Receive(Answer(k));  // asked for again, and come twice
   }
@@ -54,7 +77,7 @@ TEST(LogicalTime, CatchesUpAfterDroppedFrames) {
 
 TEST(LogicalTime, ASnapshotAnswersAllBeforeIt) {
   LogicalTime time(1);
-  for (int64_t k = 0; k < 4; ++k) time.KeyframeSent({k}, {k});
+  for (int64_t k = 0; k < 4; ++k) time.KeyframeSent({k}, {k}, 0);
   time.Receive(Answer(0));
   time.SkipTo(*Answer(2));
   EXPECT_TRUE(time.HasDeltas({3}));
@@ -80,7 +103,7 @@ TEST(LiveTime, TakesWhatIsThereAndARecordingRepeatsIt) {
     EXPECT_TRUE(live.HasDeltas({frame}));
     num_applied += static_cast<int64_t>(live.TakeDeltas({frame}).size());
     recorded.steps[{frame}] = num_applied;
-    if (frame < 5) live.KeyframeSent({frame}, {frame});
+    if (frame < 5) live.KeyframeSent({frame}, {frame}, 0);
   }
   ReplayTime replay(recorded);
   num_applied = 0;
@@ -90,14 +113,14 @@ TEST(LiveTime, TakesWhatIsThereAndARecordingRepeatsIt) {
     while (!replay.HasDeltas({frame})) replay.Receive(Answer(num_received++));
     num_applied += static_cast<int64_t>(replay.TakeDeltas({frame}).size());
     EXPECT_EQ(num_applied, (recorded.steps[{frame}])) << frame;
-    if (frame < 5) replay.KeyframeSent({frame}, {frame});
+    if (frame < 5) replay.KeyframeSent({frame}, {frame}, 0);
   }
   EXPECT_EQ(num_applied, 5);
 }
 
 TEST(ReplayTime, ARecordingOfMoreDeltasThanAreMadeDoesNotStop) {
   ReplayTime replay({.steps = {{{5}, 3}}});
-  replay.KeyframeSent({0}, {1});
+  replay.KeyframeSent({0}, {1}, 0);
   EXPECT_FALSE(replay.HasDeltas({5}));
   replay.Receive(Answer(0));
   EXPECT_TRUE(replay.HasDeltas({5}));
@@ -132,14 +155,14 @@ TEST(LogicalTime, AFrameAsksOnceAndWaitsForItsAnswer) {
 // Mono's first points belong to the first of its two keyframes, and the map has them with the second one's answer.
 TEST(LiveTime, TheAnswersToTheKeyframesOfOneFrameAreSeenTogether) {
   LiveTime time;
-  time.KeyframeSent({0}, {5});
-  time.KeyframeSent({1}, {5});
+  time.KeyframeSent({0}, {5}, 0);
+  time.KeyframeSent({1}, {5}, 0);
   time.Receive(Answer(0));
   EXPECT_TRUE(time.HasDeltas({6})) << "nothing is waited for";
   EXPECT_TRUE(time.TakeDeltas({6}).empty());
   time.Receive(Answer(1));
   EXPECT_EQ(time.TakeDeltas({7}).size(), 2U);
-  time.KeyframeSent({2}, {8});
+  time.KeyframeSent({2}, {8}, 0);
   time.Receive(Answer(2));
   EXPECT_EQ(time.TakeDeltas({9}).size(), 1U);
 }
