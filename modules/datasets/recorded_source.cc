@@ -28,6 +28,10 @@ class RecordedSource : public FrameSource {
   void CheckTimes() const;
   void PrepareRectifier(const SourceOptions& options);
   void RectifyGroundTruth();
+  template <class Pixel>
+  void RequireOwnSize(const Image<Pixel>& image, const std::string& what) const {
+    RequireSize(image.width, image.height, calibration().width_px, calibration().height_px, what);
+  }
   GrayImage ReadLeft(int64_t index);
   ColorReader ColorOfLeft(int64_t index);
   GrayImage ReadRight(int64_t index);
@@ -110,8 +114,7 @@ void RecordedSource::RectifyGroundTruth() {
 
 GrayImage RecordedSource::ReadLeft(int64_t index) {
   GrayImage image = index == first_ ? std::move(first_left_) : recording_.left->Read(index);
-  RequireSize(image.width, image.height, calibration().width_px, calibration().height_px,
-              "image " + recording_.left->Name(index));
+  RequireOwnSize(image, "image " + recording_.left->Name(index));
   return rectifier_->Left(std::move(image));
 }
 
@@ -122,23 +125,21 @@ ColorReader RecordedSource::ColorOfLeft(int64_t index) {
   return [this, index, read = std::move(read)]() -> ColorImage {
     ColorImage image = read();
     if (image.empty()) return image;
-    RequireSize(image.width, image.height, calibration().width_px, calibration().height_px,
-                "image " + recording_.left->Name(index));
+    RequireOwnSize(image, "image " + recording_.left->Name(index));
     return rectifier_->LeftColor(std::move(image));
   };
 }
 
 GrayImage RecordedSource::ReadRight(int64_t index) {
   GrayImage image = recording_.right->Read(index);
-  RequireSize(image.width, image.height, calibration().width_px, calibration().height_px,
-              "image " + recording_.right->Name(index));
+  RequireOwnSize(image, "image " + recording_.right->Name(index));
   return rectifier_->Right(std::move(image));
 }
 
 DepthImage RecordedSource::ReadDepth(int64_t index) {
   const std::string& path = recording_.depth_paths.at(static_cast<size_t>(index));
   DepthImage image = ReadDepthImage(path);
-  RequireSize(image.width, image.height, calibration().width_px, calibration().height_px, "depth image " + path);
+  RequireOwnSize(image, "depth image " + path);
   return rectifier_->Depth(std::move(image));
 }
 

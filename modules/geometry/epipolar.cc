@@ -183,7 +183,7 @@ std::vector<Rigid3> MotionsFromHomography(const Eigen::Matrix3d& homography) {
 }
 
 Eigen::Vector3d DirectionPrior::DirectionFor(const Eigen::Quaterniond& second_from_first) const {
-  return -(ExpSO3(0.5 * LogSO3(second_from_first)) * way.normalized());
+  return -(HalfOf(second_from_first) * way.normalized());
 }
 
 RefinedMotion RefineMotion(std::span<const RayPair> pairs, const Rigid3& second_from_first, double corner,

@@ -70,6 +70,8 @@ inline Eigen::Vector3d operator*(const Sim3& a_from_b, const Eigen::Vector3d& po
 Eigen::Quaterniond ExpSO3(const Eigen::Vector3d& omega_rad);
 // Its inverse, with |result| <= pi.
 Eigen::Vector3d LogSO3(const Eigen::Quaterniond& rotation);
+// About the same axis by half the angle: of a steady turn, from its beginning to its middle.
+inline Eigen::Quaterniond HalfOf(const Eigen::Quaterniond& turn) { return ExpSO3(0.5 * LogSO3(turn)); }
 
 // Tangent vectors of SE(3) are (translation [m], rotation [rad]) stacked, applied from the left:
 //   Retract(a_from_b, delta) = Rigid3{ExpSO3(delta.tail<3>()), delta.head<3>()} * a_from_b

@@ -38,7 +38,7 @@ void WriteBack(const BundleProblem& problem, const BundleResult& result, MapEdit
 // Selects the window around `center`, optimizes it and writes the result back. Does nothing where there is nothing to
 // optimize. Two rays meet somewhere whatever they show, also where keypoints only look alike: landmarks that fewer than
 // `num_confirming` keyframes see, and none with depth, follow the poses and don't move them, unless there are too few
-// others.
+// others. A result that takes half of its observations from a keyframe has lost it, and is not taken.
 void AdjustLocally(KeyframeId center, const LocalWindowOptions& window_options, const BundleOptions& bundle_options,
                    const KeyframeMotions& motions, MapEditor& editor);
 

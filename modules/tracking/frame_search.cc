@@ -10,6 +10,7 @@
 #include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
 #include "tracking/local_points.h"
+#include "tracking/pair_motion.h"
 
 namespace tessera {
 namespace {
@@ -74,8 +75,8 @@ bool FrameSearch::PairContradicts(const Rigid3& world_from_camera) {
 
 // Whether a steady motion knew where the last frame's points are seen, and the camera turned as predicted.
 bool FrameSearch::IsAsExpected(const Rigid3& world_from_camera) const {
-  return expected_.prior && ExpectedSigma_px() < kMaxPriorSigma_px &&
-         TurnBetween(expected_.world_from_camera, world_from_camera) < kMaxTurnFromPrediction_rad;
+  return expected_.prior && TurnBetween(expected_.world_from_camera, world_from_camera) < kMaxTurnFromPrediction_rad &&
+         ExpectedSigma_px() < kMaxPriorSigma_px;
 }
 
 // Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
@@ -86,14 +87,14 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   const int num = MatchLast(last_, widening * options_.matching.last_radius_px, options_.matching, frame);
   if (num < options_.min_last_matches) return false;
   const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
-  const bool is_as_expected = prior != nullptr && IsAsExpected(frame.world_from_camera);
+  const Rigid3 found = frame.world_from_camera;
   if (num_inliers > best.num_inliers) {
     best.num_inliers = num_inliers;
     best.frame = std::move(frame);
   }
   if (num_inliers < options_.min_last_matches / 2) return false;
   if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_.NumPoints()) return true;
-  return is_as_expected;
+  return prior != nullptr && IsAsExpected(found);
 }
 
 // How well a steady motion knows where the last frame's points are seen: by its way at their depth, and its turn.

@@ -4,10 +4,10 @@
 #include <memory>
 #include <optional>
 
+#include "geometry/epipolar.h"
 #include "geometry/pose_optimization.h"
 #include "matching/point_matching.h"
 #include "tracking/map_replica.h"
-#include "tracking/pair_motion.h"
 
 namespace tessera {
 
@@ -23,8 +23,9 @@ struct FrameSearchOptions {
 // What the motion so far says of a frame.
 struct ExpectedFrame {
   Rigid3 world_from_camera;
-  std::optional<ExpectedWay> way;  // nullopt: no motion is known
-  std::optional<PosePrior> prior;  // how well that is known, if the motion was steady
+  std::optional<DirectionPrior>
+      way;                         // from the last frame, whatever the turn, world units; nullopt: no motion is known
+  std::optional<PosePrior> prior;  // how well the position is known, if the motion was steady
   double turn_sigma_rad = 0.0;     // how well the turn is, an axis
 };
 
@@ -56,8 +57,9 @@ class FrameSearch {
   // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
   // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points
-  // agree with a pose: on a wall or a fence they do so in several places. No where the turn was known beforehand to
-  // the usual window, or is as a steady motion expected: where all trees look alike, two frames know it no better.
+  // agree with a pose: on a wall or a fence they do so in several places. False where the turn was known beforehand to
+  // less than the usual window, or is what a steady motion expected: among trees that look alike, two frames know it no
+  // better.
   bool PairContradicts(const Rigid3& world_from_camera);
 
  private:

@@ -15,9 +15,6 @@ constexpr double kWeakShare = 0.2;      // of the step
 constexpr double kMaxSigmas = 5.0;
 constexpr double kMinShare = 0.7, kMaxShare = 1.4;  // of the predicted length
 
-// From the frame in the middle of a step, on a steady turn, to the one at its beginning.
-Eigen::Quaterniond HalfOf(const Eigen::Quaterniond& turn) { return ExpSO3(0.5 * LogSO3(turn)); }
-
 }  // namespace
 
 // Of the latest in what the last seconds showed; at first all count alike.

@@ -32,18 +32,17 @@ std::optional<double> CommonLength(const std::vector<double>& lengths, const Pai
   return 2 * num_agreeing >= lengths.size() ? std::optional(median) : std::nullopt;
 }
 
-TwoViewOptions WithPrior(const PairMotionOptions& options, const std::optional<ExpectedWay>& expected) {
+TwoViewOptions WithPrior(const PairMotionOptions& options, const std::optional<DirectionPrior>& expected) {
   TwoViewOptions two_view = options.two_view;
   if (!expected) return two_view;
   two_view.max_direction_sigma_rad = options.max_direction_sigma_rad;
-  two_view.prior = {expected->in_middle, std::max(options.min_expected_sigma_rad, expected->direction_sigma_rad)};
+  two_view.prior = {expected->way, std::max(options.min_expected_sigma_rad, expected->sigma_rad)};
   return two_view;
 }
 
-// Whether a step of length 1 goes about where it is expected to.
-bool IsAlong(const Rigid3& last_from_current, const ExpectedWay& expected, const PairMotionOptions& options) {
-  const Eigen::Vector3d in_last = ExpSO3(0.5 * LogSO3(last_from_current.rotation)) * expected.in_middle;
-  return last_from_current.translation.dot(in_last) > options.min_cos_expected * in_last.norm();
+// The cosine between a step of length 1 and where it is expected to go.
+double CosExpected(const Rigid3& second_from_first, const DirectionPrior& expected) {
+  return second_from_first.translation.dot(expected.DirectionFor(second_from_first.rotation));
 }
 
 }  // namespace
@@ -59,7 +58,8 @@ Result<> PairMotionOptions::Check() const {
 }
 
 std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameView& current,
-                                         const std::optional<ExpectedWay>& expected, const PairMotionOptions& options) {
+                                         const std::optional<DirectionPrior>& expected,
+                                         const PairMotionOptions& options) {
   std::vector<Eigen::Vector2d> centers_px;
   for (int i = 0; i < last.view->size(); ++i) centers_px.push_back(last.view->pixel(i));
   const double radius_px = std::hypot(current.calibration().width_px, current.calibration().height_px);
@@ -73,8 +73,8 @@ std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameVi
   Rigid3 last_from_current = views->second_from_first.Inverse();
   if (length) {
     last_from_current.translation *= *length;
-  } else if (expected && IsAlong(last_from_current, *expected, options)) {
-    last_from_current.translation *= expected->in_middle.norm();
+  } else if (expected && CosExpected(views->second_from_first, *expected) > options.min_cos_expected) {
+    last_from_current.translation *= expected->way.norm();
   } else {
     return std::nullopt;
   }

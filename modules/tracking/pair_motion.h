@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/result.h"
+#include "geometry/epipolar.h"
 #include "geometry/two_view.h"
 #include "matching/matching.h"
 #include "matching/point_matching.h"
@@ -26,21 +27,16 @@ struct PairMotionOptions {
   Result<> Check() const;
 };
 
-// Where the motion so far leads, whatever the turn.
-struct ExpectedWay {
-  Eigen::Vector3d in_middle;         // in the axes of a camera halfway of the turn, world units
-  double direction_sigma_rad = 0.0;  // an axis
-};
-
 // last_from_current, in world units: rotation and direction from the essential matrix (EstimateTwoView), the length as
 // the known points that `last` sees have it: the median over them of their depth by the depth of unit length. Where
-// they are too few or disagree, the length of `expected`, if the direction is about that one's. nullopt if there is
-// neither, or the two views don't determine the motion. They need not do so by themselves: walls at either side of a
-// corner leave open how much of a step is a turn, by more than `expected` does.
+// they are too few or disagree, the length of `expected`, the way by the motion so far, if the direction is about that
+// one's. nullopt if there is neither, or the motion is not determined. The two views need not do that by themselves:
+// walls at either side of a corner leave open how much of a step is a turn, by more than `expected` does.
 //
 // A rival motion doesn't refuse it, as it does at the start: the known points or the motion so far confirm the best
 // one.
 std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameView& current,
-                                         const std::optional<ExpectedWay>& expected, const PairMotionOptions& options);
+                                         const std::optional<DirectionPrior>& expected,
+                                         const PairMotionOptions& options);
 
 }  // namespace tessera

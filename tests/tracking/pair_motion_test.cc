@@ -31,7 +31,7 @@ TEST_F(PairMotion, KnownPointsTellItsLength) {
 }
 
 TEST_F(PairMotion, WithoutKnownPointsTheExpectedStepTellsIt) {
-  const auto motion = EstimatePairMotion(KnowsFirst(last_, 0), *current_, ExpectedWay{{0.0, 0.0, 2.0}, 0.2}, {});
+  const auto motion = EstimatePairMotion(KnowsFirst(last_, 0), *current_, DirectionPrior{{0.0, 0.0, 2.0}, 0.2}, {});
   ASSERT_TRUE(motion.has_value());
   EXPECT_NEAR(motion->translation.norm(), 2.0, 1e-9);
   EXPECT_GT(motion->translation.normalized().dot(last_from_current_.translation.normalized()), 0.99);
@@ -40,7 +40,7 @@ TEST_F(PairMotion, WithoutKnownPointsTheExpectedStepTellsIt) {
 TEST_F(PairMotion, IsUnknownIfItsLengthIsOrItGoesElsewhereThanExpected) {
   const TrackedFrame unknown = KnowsFirst(last_, 0);
   EXPECT_FALSE(EstimatePairMotion(unknown, *current_, std::nullopt, {}).has_value());
-  EXPECT_FALSE(EstimatePairMotion(unknown, *current_, ExpectedWay{{0.0, 0.0, -1.0}, 0.2}, {}).has_value());
+  EXPECT_FALSE(EstimatePairMotion(unknown, *current_, DirectionPrior{{0.0, 0.0, -1.0}, 0.2}, {}).has_value());
 }
 
 TEST(PairMotionOptions, AreChecked) {
