@@ -134,6 +134,10 @@ std::optional<Journal::Entry> Journal::Read() {
   return entry;
 }
 
+double Journal::replayed_share() const {
+  return is_replaying() ? static_cast<double>(num_bytes_) / static_cast<double>(size_) : 1.0;
+}
+
 std::optional<Journal::Entry> Journal::Next() {
   if (!reader_) return std::nullopt;
   std::optional<Entry> entry = Read();

@@ -40,6 +40,8 @@ class Journal {
 
   // There are entries of an earlier life that Next() has not given yet, or it was not asked.
   bool is_replaying() const { return reader_ != nullptr; }
+  // How much of the file, 0 to 1, Next() has given; 1 where there is nothing to give.
+  double replayed_share() const;
   // The next of them; nullopt: that was the last one.
   std::optional<Entry> Next();
 

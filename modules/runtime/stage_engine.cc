@@ -20,6 +20,7 @@ constexpr int64_t kStatusPeriodUs = 500'000;
 constexpr int64_t kMaxErrorsPerSecond = 10;    // that are logged; all are counted
 constexpr size_t kMaxPublishers = 4096;        // of one channel
 constexpr int64_t kHeartbeatsAfterValue = 10;  // after so many that told of the last value, they become rarer
+constexpr const char* kJournalReplayed = "journal_replayed";  // in STATUS: the share, of a process that was killed
 
 }  // namespace
 
@@ -162,6 +163,7 @@ void StageEngine::ReplayOne() {
   if (const std::optional<Journal::Entry> entry = journal_->Next()) return incoming_.Replay(*entry);
   outgoing_.EndReplay();
   incoming_.EndReplay();
+  figures_.SetValue(kJournalReplayed, journal_->replayed_share());
   SendHeartbeats();  // who lacks the last messages asks for them
   log_(false, "continues where it was when it was killed");
 }
@@ -246,6 +248,7 @@ void StageEngine::SendStatus(bool is_final) {
   if (is_final) {
     for (const auto& other : others_) other->SendStatus(true);
   }
+  if (is_replaying()) figures_.SetValue(kJournalReplayed, journal_->replayed_share());
   SendValue(status_stream_, figures_.MakeStatus(state, incoming_.counts(), incoming_.num_undecodable(),
                                                 incoming_.num_strangers(), now_us, is_final));
 }

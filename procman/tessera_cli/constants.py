@@ -77,7 +77,8 @@ FREE_BUS_S = 0.5
 # A process that does not report within this time never will; LCM's self-test alone may take 10 s.
 START_TIMEOUT_S = 20.0
 # A stored source without a new pose for this long is stuck, unless a stage works on the map: repairs and late tiles
-# take a few seconds, but the adjustment of a large map, which frames may have to wait for, takes minutes.
+# take a few seconds, but the adjustment of a large map, which frames may have to wait for, takes minutes. A stage that
+# goes through its journal is waited for as long as it gets on.
 STALL_TIMEOUT_S = 120.0
 ADJUSTMENT_TIMEOUT_S = 900.0
 # After Ctrl-C, the time in which frames that are already in the pipeline may still be tracked.

@@ -56,6 +56,25 @@ TEST_F(JournalTest, EachLifeContinuesTheOneBefore) {
   }
 }
 
+TEST_F(JournalTest, TellsHowMuchOfItHasBeenGiven) {
+  {
+    Journal journal(path_, 77, kMaxBytes);
+    EXPECT_EQ(journal.replayed_share(), 1.0);
+    Append(journal, 0, 50);
+  }
+  Journal journal(path_, 78, kMaxBytes);
+  double last = journal.replayed_share();
+  EXPECT_LT(last, 0.02);
+  for (int i = 0; i < 50; ++i) {
+    ASSERT_TRUE(journal.Next());
+    EXPECT_GT(journal.replayed_share(), last);
+    last = journal.replayed_share();
+  }
+  EXPECT_EQ(last, 1.0);
+  EXPECT_FALSE(journal.Next());
+  EXPECT_EQ(journal.replayed_share(), 1.0);
+}
+
 // A process dies, or a machine loses its power, wherever it is.
 TEST_F(JournalTest, WhatIsNotWholeIsCutOff) {
   {

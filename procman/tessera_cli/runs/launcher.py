@@ -13,11 +13,9 @@ from pathlib import Path
 from tessera_cli.cluster.keys import key_folder
 from tessera_cli.console import say
 from tessera_cli.constants import (
-    ADJUSTMENT_TIMEOUT_S,
     DEFAULT_PORT,
     DRAIN_TIMEOUT_S,
     LISTEN_S,
-    STALL_TIMEOUT_S,
     START_TIMEOUT_S,
 )
 from tessera_cli.errors import RunError, UserError
@@ -50,6 +48,7 @@ from tessera_cli.supervision.private_deputy import PrivateDeputy
 from tessera_cli.supervision.process_list import Process, read_process_list
 from tessera_cli.supervision.silence import SilenceWatch
 from tessera_cli.supervision.stack_monitor import StackMonitor, hear_heartbeats, is_of_this_machine
+from tessera_cli.supervision.stall_watch import StallWatch
 from tessera_cli.supervision.state_folder import LogFolder
 from tessera_cli.versions import tessera_version
 
@@ -174,7 +173,7 @@ class Launcher:
         self._interrupt = Interrupt()
         self._num_warnings_shown = 0
         self._silence = SilenceWatch(lambda name: deputy.is_busy([name]))
-        self._map_busy_at = 0.0  # monotonic seconds
+        self._stall = StallWatch()
 
     def run(self) -> int:
         """The exit status. All processes have ended when it returns or raises."""
@@ -288,15 +287,12 @@ class Launcher:
     def _check_stall(self) -> None:
         progress = self._monitor.progress
         now = time.monotonic()
-        if self._deputy.is_busy(MAP_STAGES):
-            self._map_busy_at = now
-        waited_s = now - max(progress.last_pose_at or 0.0, progress.started_at)
-        idle_s = min(waited_s, now - self._map_busy_at)
-        if self._source.is_live or (idle_s < STALL_TIMEOUT_S and waited_s < ADJUSTMENT_TIMEOUT_S):
+        stuck_s = self._stall.stuck_s(progress, self._deputy.is_busy(MAP_STAGES), now)
+        if self._source.is_live or stuck_s is None:
             return
         errors = [f"{report.name}: {report.last_error}" for report in progress.stages.values() if report.last_error]
         hint = errors[-1] if errors else f"the logs are in {self._folder / 'stages'}."
-        raise RunError(f"no pose for {waited_s:.0f} s after {progress.num_poses} frames; {hint}")
+        raise RunError(f"no pose for {stuck_s:.0f} s after {progress.num_poses} frames; {hint}")
 
     def _summarize(self, wall_s: float, ended: str) -> Result:
         reports, processes = self._monitor.progress.stages.values(), self._deputy.processes

@@ -135,9 +135,24 @@ class Progress:
     @property
     def state(self) -> str:
         """Of tracking, unless there is nothing to track."""
+        if self.catching_up:
+            name, share = self.catching_up
+            return f"{name} was started again and has done {share:.0%} of its work again"
         if self.silent_s > 0:
             return f"camera silent for {self.silent_s:.0f} s"
         return self.tracking_state or "no pose yet"
+
+    @property
+    def catching_up(self) -> tuple[str, float] | None:
+        """The stage that was started again and is farthest from where it was, and the share of its journal that it has
+        been through. What it says anew, others have already."""
+        shares = [
+            (stage.values.get("journal_replayed", 1.0), stage.name)
+            for stage in self.stages.values()
+            if stage.state == RUNNING
+        ]
+        share, name = min(shares, default=(1.0, ""))
+        return (name, share) if share < 1.0 else None
 
     @property
     def silent_s(self) -> float:
