@@ -31,13 +31,14 @@ double AsideAt(double time_s, uint32_t seed) {
   constexpr double kPeriodS = 2.75;
   const double number = std::floor(time_s / kPeriodS);
   Random random(HashOf(seed, 23, static_cast<uint32_t>(static_cast<int64_t>(number))));
-  const double begin = number * kPeriodS + random.Uniform(1.0, 1.2);
+  const double begin_s = random.Uniform(1.0, 1.2);
   const double side = random.Chance(0.5) ? 1.0 : -1.0;
   const bool is_wide = random.Chance(0.4);  // the desk leaves the image
   const double far = side * (is_wide ? random.Uniform(0.42, 0.52) : random.Uniform(0.24, 0.32));
   const double turn_s = is_wide ? random.Uniform(0.58, 0.68) : random.Uniform(0.42, 0.5);
-  const double stay_s = random.Uniform(0.1, 0.5);
+  const double stay_s = std::min(random.Uniform(0.1, 0.5), kPeriodS - begin_s - 2.0 * turn_s);  // it is back in time
   const auto ease = [](double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); };
+  const double begin = number * kPeriodS + begin_s;
   return far * (ease((time_s - begin) / turn_s) - ease((time_s - begin - turn_s - stay_s) / turn_s));
 }
 

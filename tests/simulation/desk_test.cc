@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/drive.h"
 #include "simulation/simulation.h"
 
 namespace tessera {
@@ -33,6 +34,17 @@ TEST(Desk, TheHandIsSlowAndTurnsFastAtMoments) {
     EXPECT_LT(turns[turns.size() / 2], 0.8) << name;
     EXPECT_GT(turns.back(), 2.0) << name;
     EXPECT_LT(turns.back(), 3.6) << name;
+  }
+}
+
+TEST(Desk, NoLookAsideIsCutOff) {
+  for (uint32_t seed = 1; seed <= 50; ++seed) {
+    const DeskTrajectory trajectory(20.0, 1.0, seed);
+    for (int frame = 0; frame < 600; ++frame) {
+      const Rigid3 step =
+          trajectory.WorldFromCamera(frame / 30.0).Inverse() * trajectory.WorldFromCamera((frame + 1) / 30.0);
+      ASSERT_LT(30.0 * 2.0 * step.rotation.vec().norm(), 4.0) << "rad/s, seed " << seed << ", frame " << frame;
+    }
   }
 }
 
