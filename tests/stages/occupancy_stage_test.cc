@@ -161,13 +161,15 @@ TEST(OccupancyStage, TheMapWriterWritesWhatItKnowsOfARunningStack) {
   for (int64_t id = 0; id < kNumKeyframes; ++id) publishers.SendKeyframe(id);
   bus.RunUntilQuiet();
   bus.Start<MapWriterStage>("tree_writer", 0, {"map_writer.path=" + folder.File("now.bt")});
+  bus.Start<MapWriterStage>("color_writer", 0, {"map_writer.path=" + folder.File("now.ot")});
   bus.Start<MapWriterStage>("grid_writer", 0, {"map_writer.path=" + folder.File("now.pgm")});
   const auto exists = [&](const std::string& name) { return std::filesystem::exists(folder.File(name)); };
   ASSERT_TRUE(
-      bus.RunUntil([&] { return exists("now.bt") && exists("now.pgm") && exists("now.yaml"); }));
+      bus.RunUntil([&] { return exists("now.bt") && exists("now.ot") && exists("now.pgm") && exists("now.yaml"); }));
   OccupancyStates states(RoomOptions().resolution);
   states.Set(publishers.Expected().Blocks());
   EXPECT_EQ(ReadFile(folder.File("now.bt")), states.BinaryTreeFile());
+  EXPECT_EQ(ReadFile(folder.File("now.ot")), states.ColorTreeFile());
   EXPECT_THAT(ReadFile(folder.File("now.yaml")), testing::HasSubstr("image: now.pgm\n"));
 }
 
