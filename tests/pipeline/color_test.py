@@ -128,11 +128,12 @@ def going(tessera: Tessera, source: Path, pace: float = 0.2) -> Iterator[Going]:
 def test_the_map_of_a_running_stack_is_in_color(tessera: Tessera, painted: Path, tmp_path: Path) -> None:
     """Also that of keyframes from before the listener came."""
     with going(tessera, painted, pace=0.1) as run:
-        run.wait_for(NUM_FRAMES // 4)
+        run.wait_for(NUM_FRAMES // 2)
         for name in ("now.ply", "now.ot"):
             tessera.command("map", tmp_path / name, "--port", run.port).must_end_well()
         run.finish()
     landmarks = vertices(tmp_path / "now.ply")
+    assert landmarks["observations"].max() > 1, "the map of then, not that of the first keyframe"
     assert share_of_right_colors(landmarks["position"], landmarks["rgb"]) > 0.95
     voxels, colors = voxels_in_color(tmp_path / "now.ot")
     assert share_of_right_colors(voxels.centers, colors) > 0.9

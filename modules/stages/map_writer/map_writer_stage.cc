@@ -20,6 +20,10 @@ constexpr int64_t kNoColorUs = 2'000'000;
 // In which a camera can have told all that it keeps; a map that was loaded may have later frames than the run.
 constexpr int64_t kMaxWaitForColorsUs = 10'000'000;
 constexpr std::chrono::milliseconds kLookAgain{100};
+// A mapper answers who comes late with an old snapshot and the deltas behind it, one after the other: the map is that
+// of now when none has come for so long, or after so long in all, where new ones never stop.
+constexpr int64_t kQuietUs = 400'000;
+constexpr int64_t kMaxCatchUpUs = 3'000'000;
 
 std::string PathFrom(const Settings& settings) {
   auto path = settings.Get<MapWriterSettings>().path;
@@ -80,7 +84,8 @@ Result<> MapWriterStage::Apply(const MapDelta& delta) {
   TESSERA_RETURN_IF_FAILED(replica_.Apply(delta));
   context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));
   colors_.Receive(delta);
-  if (!map_since_us_) map_since_us_ = last_color_us_ = context_.now_us();
+  last_delta_us_ = context_.now_us();
+  if (!map_since_us_) map_since_us_ = last_color_us_ = last_delta_us_;
   if (!delta.new_keyframes.empty()) newest_keyframe_ = delta.new_keyframes.back().features->frame;
   return {};
 }
@@ -90,6 +95,12 @@ void MapWriterStage::Receive(const ColorFrame& color) {
   newest_color_ = std::max(newest_color_, color.id);
   last_color_us_ = context_.now_us();
   WriteIfDone();
+}
+
+bool MapWriterStage::HasCaughtUp() const {
+  const int64_t now_us = context_.now_us();
+  return map_.is_complete() || now_us - last_delta_us_ >= kQuietUs ||
+         now_us - map_since_us_.value_or(now_us) >= kMaxCatchUpUs;
 }
 
 // As far as the camera still has them: it tells one of each keyframe, in their order.
@@ -103,7 +114,7 @@ bool MapWriterStage::HasColors() const {
 void MapWriterStage::WriteIfDone() {
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
   if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
-  if (kind_ == Kind::kLandmarks ? !HasColors() : !occupancy_) return;
+  if (kind_ == Kind::kLandmarks ? !HasCaughtUp() || !HasColors() : !occupancy_) return;
   try {
     Write();
   } catch (const InputError& error) {

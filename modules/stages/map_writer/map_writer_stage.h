@@ -28,6 +28,7 @@ class MapWriterStage {
   void AskForOccupancy();
   Result<> Apply(const MapDelta& delta);
   void Receive(const ColorFrame& color);
+  bool HasCaughtUp() const;
   bool HasColors() const;
   void WriteIfDone();
   void Write() const;
@@ -44,6 +45,7 @@ class MapWriterStage {
   LandmarkColors colors_{/*joins_late=*/true};
   FrameId newest_keyframe_, newest_color_;
   std::optional<int64_t> map_since_us_;
+  int64_t last_delta_us_ = 0;
   int64_t last_color_us_ = 0;  // when the last color came, or the map did
   Publisher<OccupancyRequest> requests_;
   int64_t num_asked_ = 0;
