@@ -27,12 +27,14 @@ ColorImage ReadOrNone(const ColorReader& read) {
 
 }  // namespace
 
-CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us)
+CameraSession::CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us,
+                             SourceOpener open_again)
     : is_followed_(options.is_followed),
       with_color_(options.with_color),
       source_(std::move(source)),
       pacer_(PaceOf(*source_, options)),
       renumbering_(options.num_on_the_way),
+      open_again_(std::move(open_again)),
       last_progress_us_(now_us) {}
 
 Result<> CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us) {
@@ -53,9 +55,41 @@ Result<> CameraSession::MarkTracked(FrameId frame, int64_t utime_us, int64_t now
 
 CameraActions CameraSession::TellColor(FrameId frame, int64_t utime_us) {
   if (!with_color_) return {};
-  const auto found = colors_.find(frame);
-  return {ColorFrame{
-      .id = frame, .utime_us = utime_us, .image = found == colors_.end() ? ColorImage() : ReadOrNone(found->second)}};
+  ColorFrame color{.id = frame, .utime_us = utime_us, .image = {}};
+  if (const auto found = colors_.find(frame); found != colors_.end()) {
+    color.image = ReadOrNone(found->second);
+    return {std::move(color)};
+  }
+  if (!open_again_) return {std::move(color)};
+  missed_.push_back(std::move(color));
+  if (missed_.size() <= kMaxColors) return {};
+  CameraActions dropped{std::move(missed_.front())};
+  missed_.pop_front();
+  return dropped;
+}
+
+CameraActions CameraSession::TellMissedColor() {
+  if (missed_.empty()) {
+    again_.reset();
+    return {};
+  }
+  ColorFrame color = std::move(missed_.front());
+  missed_.pop_front();
+  color.image = ReadColorAgain(color.id);
+  return {std::move(color)};
+}
+
+// Empty if the source does not yield this frame any more.
+ColorImage CameraSession::ReadColorAgain(FrameId frame) {
+  try {
+    if (!again_) again_ = open_again_(frame);
+    again_->SkipTo(frame);
+    std::optional<CameraFrame> read = again_->Next();
+    while (read && read->id < frame) read = again_->Next();
+    return read && read->id == frame ? ReadOrNone(again_->TakeColor()) : ColorImage();
+  } catch (const InputError&) {
+    return {};
+  }
 }
 
 CameraSession::State CameraSession::Look(int64_t now_us) {
@@ -127,8 +161,8 @@ CameraActions CameraSession::Send(int64_t now_us) {
 
 // Of the frame that is sent next.
 void CameraSession::KeepColor(CameraActions& actions) {
+  if (!with_color_) return;
   ColorReader color = std::exchange(next_color_, nullptr);
-  if (!color) return;
   if (is_followed_) {
     colors_[next_->id] = std::move(color);
     if (colors_.size() > kMaxColors) colors_.erase(colors_.begin());

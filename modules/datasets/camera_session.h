@@ -11,10 +11,13 @@
 // which frames do, all of them are, each before its frame.
 //
 // A camera that was started again learns from POSE what is tracked, and continues behind it: what was on its way is
-// sent once more. A recorded source keeps its numbers; a live one gets higher ones (renumbering.h).
+// sent once more. A recorded source keeps its numbers; a live one gets higher ones (renumbering.h). Which colors of
+// keyframes arrived in its earlier life nobody tells it: it reads the newest ones again, and tells them once more.
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -42,18 +45,25 @@ struct CameraSessionOptions {
 using CameraAction = std::variant<GroundTruthPose, ColorFrame, CameraFrame, EndOfStream, Fail, Finish>;
 using CameraActions = std::vector<CameraAction>;
 
+// Opens a recorded source once more, to be read from this frame on. Throws InputError if it can't.
+using SourceOpener = std::function<std::unique_ptr<FrameSource>(FrameId first)>;
+
 class CameraSession {
  public:
   enum class State { kMustRead, kWaits, kReady, kAtEnd, kEnded };
 
-  CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us);
+  // `open_again`: null if the source can't be opened twice.
+  CameraSession(std::unique_ptr<FrameSource> source, const CameraSessionOptions& options, int64_t now_us,
+                SourceOpener open_again = nullptr);
 
   const FrameSource& source() const { return *source_; }
   // This frame, taken at `utime_us`, and all before it, have a pose. Fails if it can't have been sent.
   Result<> MarkTracked(FrameId frame, int64_t utime_us, int64_t now_us);
-  // What tells the color of this frame, which became a keyframe: an empty image if there is none, or if it was sent in
-  // an earlier life. Nothing if colors are not wanted.
+  // What tells the color of this frame, which became a keyframe: an empty image if there is none. Nothing if colors are
+  // not wanted, or if it has to be read again: TellMissedColor() does that. Frames ascend.
   CameraActions TellColor(FrameId frame, int64_t utime_us);
+  // The color of one keyframe of an earlier life; nothing if there is none left. It decodes an image.
+  CameraActions TellMissedColor();
   std::vector<std::string> TakeEvents() { return source_->TakeEvents(); }
   // The state now; passes over what is tracked.
   State Look(int64_t now_us);
@@ -74,7 +84,8 @@ class CameraSession {
   static constexpr int64_t kLookAtLiveUs = 2'000;
   // Without a pose for this long, lockstep asks for help: the slowest pipeline tracks a frame in less.
   static constexpr int64_t kNoPoseUs = 10'000'000;
-  // Frames whose colors are kept until their poses come; of more, the oldest are dropped.
+  // Frames whose colors are kept until their poses come, and keyframes whose colors are read again; of more, the
+  // oldest are dropped.
   static constexpr size_t kMaxColors = 64;
   // No pipeline has so many frames in it.
   static constexpr int64_t kMaxFramesAhead = 10'000;
@@ -84,6 +95,7 @@ class CameraSession {
   CameraActions Read();
   CameraActions Send(int64_t now_us);
   void KeepColor(CameraActions& actions);
+  ColorImage ReadColorAgain(FrameId frame);
   CameraActions TruthsUpTo(FrameId frame);
 
   const bool is_followed_;
@@ -93,7 +105,10 @@ class CameraSession {
   Renumbering renumbering_;                // of a live source
   std::optional<CameraFrame> next_;        // read and not yet sent
   ColorReader next_color_;                 // of next_
-  std::map<FrameId, ColorReader> colors_;  // of frames that were sent and have no pose yet
+  std::map<FrameId, ColorReader> colors_;  // of all frames that were sent and have no pose yet; null: gray
+  std::deque<ColorFrame> missed_;          // keyframes whose colors are to be read again
+  const SourceOpener open_again_;
+  std::unique_ptr<FrameSource> again_;  // the source, while missed_ are read from it
   bool is_exhausted_ = false;
   size_t num_truths_sent_ = 0;
   int64_t num_sent_ = 0;

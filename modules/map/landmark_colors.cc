@@ -3,8 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 
 namespace tessera {
+namespace {
+
+size_t BytesOf(const ColorFrame& color) { return sizeof(Rgb) * color.image.pixels.size(); }
+
+}  // namespace
 
 std::vector<Rgb> ColorsAt(const std::vector<Keypoint>& keypoints, const ColorImage& image) {
   std::vector<Rgb> colors;
@@ -22,17 +28,18 @@ std::vector<Rgb> ColorsAt(const std::vector<Keypoint>& keypoints, const ColorIma
 void LandmarkColors::Receive(const ColorFrame& color) {
   answered_.insert(color.id);
   if (const auto keyframe = keyframes_.find(color.id); keyframe != keyframes_.end()) {
-    Set(keyframe->second, color.image);
+    Set(keyframe->second, color);
     keyframes_.erase(keyframe);
-  } else if (!color.image.empty()) {
-    images_[color.id] = color.image;
-    if (images_.size() > kMaxImages) images_.erase(images_.begin());
+  } else if (!color.image.empty() && images_.try_emplace(color.id, color).second) {
+    image_bytes_ += BytesOf(color);
+    while (image_bytes_ > kMaxImageBytes) DropImagesBefore(std::next(images_.begin()));
   }
 }
 
-// Keyframes enter the map in the order of their frames: an image that is passed over has none.
+// Keyframes enter the map in the order of their frames: an image that is passed over has none. A snapshot may begin
+// with those of a loaded map, whose numbers are others.
 void LandmarkColors::Receive(const MapDelta& delta) {
-  if (delta.is_snapshot) return;
+  if (delta.is_snapshot && !joins_late_) return;
   for (const MapDelta::NewKeyframe& added : delta.new_keyframes) {
     const FrameId frame = added.features->frame;
     const Waiting keyframe{added.id, added.features};
@@ -41,12 +48,18 @@ void LandmarkColors::Receive(const MapDelta& delta) {
     } else if (!answered_.contains(frame)) {
       keyframes_[frame] = keyframe;
     }
-    images_.erase(images_.begin(), images_.upper_bound(frame));
+    if (!delta.is_snapshot) DropImagesBefore(images_.upper_bound(frame));
   }
 }
 
-void LandmarkColors::Set(const Waiting& keyframe, const ColorImage& image) {
-  if (!image.empty()) colors_[keyframe.id] = ColorsAt(keyframe.features->keypoints, image);
+// A keyframe of a loaded map may have the same number, but was taken at another time.
+void LandmarkColors::Set(const Waiting& keyframe, const ColorFrame& color) {
+  if (color.image.empty() || color.utime_us != keyframe.features->utime_us) return;
+  colors_[keyframe.id] = ColorsAt(keyframe.features->keypoints, color.image);
+}
+
+void LandmarkColors::DropImagesBefore(std::map<FrameId, ColorFrame>::iterator end) {
+  for (auto it = images_.begin(); it != end; it = images_.erase(it)) image_bytes_ -= BytesOf(it->second);
 }
 
 bool LandmarkColors::is_complete() const {

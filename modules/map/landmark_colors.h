@@ -20,11 +20,14 @@ std::vector<Rgb> ColorsAt(const std::vector<Keypoint>& keypoints, const ColorIma
 
 class LandmarkColors {
  public:
+  // `joins_late`: keyframes of a snapshot may be of this run. Otherwise they are of a loaded map and have no colors.
+  explicit LandmarkColors(bool joins_late = false) : joins_late_(joins_late) {}
+
   // This frame became a keyframe: its color will come.
   void Expect(FrameId frame) { expected_.insert(frame); }
   // An empty one says that there is none.
   void Receive(const ColorFrame& color);
-  // A change of the map. Keyframes of a snapshot have no colors: they are of a loaded map.
+  // A change of the map.
   void Receive(const MapDelta& delta);
 
   // Whether all that was expected has come.
@@ -34,18 +37,22 @@ class LandmarkColors {
   // The mean over the observers whose colors are known; nullopt if none is.
   std::optional<Rgb> Of(const ObservedLandmark& landmark) const;
 
-  // Images that wait for their keyframe to enter the map; of more, the oldest are dropped.
-  static constexpr size_t kMaxImages = 32;
+  // Images that wait for their keyframe to enter the map, more than a camera keeps for who comes late; of more, the
+  // oldest are dropped.
+  static constexpr size_t kMaxImageBytes = size_t{128} << 20;
 
  private:
   struct Waiting {
     KeyframeId id;
     std::shared_ptr<const FeatureFrame> features;
   };
-  void Set(const Waiting& keyframe, const ColorImage& image);
+  void Set(const Waiting& keyframe, const ColorFrame& color);
+  void DropImagesBefore(std::map<FrameId, ColorFrame>::iterator end);
 
+  bool joins_late_;
   std::set<FrameId> expected_, answered_;
-  std::map<FrameId, ColorImage> images_;           // whose keyframes are not in the map yet
+  std::map<FrameId, ColorFrame> images_;  // whose keyframes are not in the map yet
+  size_t image_bytes_ = 0;
   std::map<FrameId, Waiting> keyframes_;           // whose colors did not come yet
   std::map<KeyframeId, std::vector<Rgb>> colors_;  // by keypoint
 };

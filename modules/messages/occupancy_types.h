@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "core/ids.h"
+#include "core/image.h"
 
 namespace tessera {
 
@@ -40,6 +42,12 @@ struct OccupancyBlock {
     uint8_t& byte = states[voxel / kPerByte];
     byte = static_cast<uint8_t>((byte & ~(3U << shift)) | (static_cast<unsigned>(state) << shift));
   }
+  size_t NumOccupied() const {
+    constexpr unsigned kOccupiedBits = 0xAA;  // of four voxels: no state has both bits
+    size_t num = 0;
+    for (const uint8_t four : states) num += static_cast<size_t>(std::popcount(four & kOccupiedBits));
+    return num;
+  }
 };
 
 // The blocks that changed since the last update; of a block that is told, all voxels.
@@ -49,6 +57,8 @@ struct OccupancyUpdate {
   bool is_whole = false;      // all blocks: those that are not told are unknown
   int64_t num_keyframes = 0;  // whose scans are in the map
   std::vector<OccupancyBlock> blocks;
+  // Of the occupied voxels of all blocks, in their order; empty: the images are gray.
+  std::vector<Rgb> colors;
 
   bool operator==(const OccupancyUpdate&) const = default;
 };

@@ -44,6 +44,10 @@ void OccupancyMap::Put(KeyframeId keyframe, SharedScan scan, const Rigid3& world
   Remove(keyframe);
   // A voxel's count has room for so many.
   if (scans_.size() == std::numeric_limits<uint16_t>::max()) throw std::length_error("the occupancy map is full");
+  if (scan->is_colored() && !is_colored_) {
+    is_colored_ = true;  // what was told before was told without colors
+    for (const auto& [key, block] : counts_.blocks()) touched_.insert(key);
+  }
   Count(scans_[keyframe] = {std::move(scan), world_from_camera}, 1);
 }
 
@@ -115,14 +119,28 @@ std::vector<OccupancyBlock> OccupancyMap::TakeChangedBlocks() {
   std::vector<OccupancyBlock> changed;
   for (const BlockKey key : touched_) {
     const auto* counts = counts_.Find(key);
-    const OccupancyBlock block = counts == nullptr ? EmptyBlock(key) : StatesOf(key, *counts);
-    OccupancyBlock& told = told_.try_emplace(key, EmptyBlock(key)).first->second;
-    if (block == told) continue;
-    told = block;
-    changed.push_back(block);
+    Told now{.block = counts == nullptr ? EmptyBlock(key) : StatesOf(key, *counts), .colors = {}};
+    now.colors = ColorsOf({&now.block, 1});
+    Told& told = told_.try_emplace(key, Told{EmptyBlock(key), {}}).first->second;
+    if (now == told) continue;
+    changed.push_back(now.block);
+    told = std::move(now);
   }
   touched_.clear();
   return changed;
+}
+
+std::vector<Rgb> OccupancyMap::ColorsOf(std::span<const OccupancyBlock> blocks) const {
+  std::vector<Rgb> colors;
+  if (!is_colored_) return colors;
+  for (const OccupancyBlock& block : blocks) {
+    const auto* const counts = counts_.Find(KeyOf(block));
+    const auto* const sums = colors_.Find(KeyOf(block));
+    for (size_t i = 0; i < OccupancyBlock::kNumVoxels; ++i) {
+      if (block.At(i) == VoxelState::kOccupied) colors.push_back((*sums)[i].Mean((*counts)[i].num_hits));
+    }
+  }
+  return colors;
 }
 
 std::string OccupancyMap::ColorTreeFile() const {

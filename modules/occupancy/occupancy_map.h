@@ -17,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -58,8 +59,10 @@ class OccupancyMap {
 
   // All blocks in which something is known, by key.
   std::vector<OccupancyBlock> Blocks() const;
-  // Those whose states may differ from what the last call returned; no block is told twice without a change between.
+  // Those whose states or colors differ from what the last call returned.
   std::vector<OccupancyBlock> TakeChangedBlocks();
+  // Of the occupied voxels of these blocks of the map, in their order; empty if no scan was in color.
+  std::vector<Rgb> ColorsOf(std::span<const OccupancyBlock> blocks) const;
 
   // OctoMap's file of log-odds and colors (a ColorOcTree, `.ot`): the sum L of each voxel within the bounds of the
   // options, and the mean color of its hits.
@@ -69,6 +72,11 @@ class OccupancyMap {
   struct Counts {
     uint16_t num_hits = 0;
     uint16_t num_misses = 0;
+  };
+  struct Told {
+    OccupancyBlock block;
+    std::vector<Rgb> colors;
+    bool operator==(const Told&) const = default;
   };
   VoxelState StateOf(const Counts& counts) const;
   void Count(const Placed& placed, int sign);
@@ -81,8 +89,9 @@ class OccupancyMap {
   VoxelBlocks<Counts> counts_;
   VoxelBlocks<ColorSum> colors_;  // over the scans that hit it; in most blocks nothing is hit
   std::map<KeyframeId, Placed> scans_;
-  std::set<BlockKey> touched_;               // since TakeChangedBlocks() was called last
-  std::map<BlockKey, OccupancyBlock> told_;  // what it returned
+  bool is_colored_ = false;        // a scan was in color
+  std::set<BlockKey> touched_;     // since TakeChangedBlocks() was called last
+  std::map<BlockKey, Told> told_;  // what it returned
 };
 
 }  // namespace tessera

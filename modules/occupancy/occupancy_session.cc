@@ -40,7 +40,7 @@ void OccupancySession::Receive(const CameraFrame& frame) {
   images_.emplace(frame.id, frame);
 }
 
-// The first one counts: a camera that was started again sends empty ones for keyframes before.
+// The first one counts: a camera that was started again tells those of keyframes before once more.
 void OccupancySession::Receive(const ColorFrame& color) {
   if (!options_.with_color || colors_.contains(color.id)) return;
   const bool has_room = image_bytes_ + BytesOf(color.image) <= options_.max_image_bytes;

@@ -1,9 +1,11 @@
 #include "occupancy/occupancy_states.h"
 
+#include <octomap/ColorOcTree.h>
 #include <octomap/OcTree.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <sstream>
 
 namespace tessera {
@@ -15,6 +17,22 @@ constexpr double kOriginVoxel = 1 << 15;
 constexpr double kNumKeys = 1 << 16;
 
 int32_t PartOf(BlockKey key, int axis) { return static_cast<int32_t>((key >> (12 * axis)) & 0xFFF) - kOriginBlock; }
+
+// `paint(node, key, number)`: of the occupied voxel `number` of a block.
+template <class Tree, class Paint>
+void FillTree(const std::map<BlockKey, OccupancyBlock>& blocks, Tree& tree, Paint paint) {
+  for (const auto& [key, block] : blocks) {
+    size_t num_occupied = 0;
+    for (size_t i = 0; i < OccupancyBlock::kNumVoxels; ++i) {
+      if (block.At(i) == VoxelState::kUnknown) continue;
+      const bool is_occupied = block.At(i) == VoxelState::kOccupied;
+      const float log_odds = is_occupied ? tree.getClampingThresMaxLog() : tree.getClampingThresMinLog();
+      auto* const node = tree.setNodeValue(VoxelAt(key, i), log_odds, /*lazy_eval=*/true);
+      if (is_occupied) paint(*node, key, num_occupied++);
+    }
+  }
+  tree.updateInnerOccupancy();
+}
 
 }  // namespace
 
@@ -29,14 +47,25 @@ BlockKey KeyOf(const OccupancyBlock& block) {
   return part(block.x) | part(block.y) << 12 | part(block.z) << 24;
 }
 
-void OccupancyStates::Set(std::span<const OccupancyBlock> blocks) {
+void OccupancyStates::Set(std::span<const OccupancyBlock> blocks, std::span<const Rgb> colors) {
   for (const OccupancyBlock& block : blocks) {
+    const BlockKey key = KeyOf(block);
     if (IsEmpty(block)) {
-      blocks_.erase(KeyOf(block));
+      blocks_.erase(key);
     } else {
-      blocks_.insert_or_assign(KeyOf(block), block);
+      blocks_.insert_or_assign(key, block);
     }
+    colors_.erase(key);
+    if (colors.empty()) continue;
+    const size_t num = block.NumOccupied();
+    if (num > 0) colors_[key].assign(colors.begin(), colors.begin() + static_cast<std::ptrdiff_t>(num));
+    colors = colors.subspan(num);
   }
+}
+
+void OccupancyStates::Clear() {
+  blocks_.clear();
+  colors_.clear();
 }
 
 int64_t OccupancyStates::Num(VoxelState state) const {
@@ -60,17 +89,23 @@ VoxelState OccupancyStates::At(const Eigen::Vector3d& point_in_world) const {
 
 std::string OccupancyStates::BinaryTreeFile() const {
   octomap::OcTree tree(resolution_);
-  for (const auto& [key, block] : blocks_) {
-    for (size_t i = 0; i < OccupancyBlock::kNumVoxels; ++i) {
-      if (block.At(i) == VoxelState::kUnknown) continue;
-      const bool is_occupied = block.At(i) == VoxelState::kOccupied;
-      const float log_odds = is_occupied ? tree.getClampingThresMaxLog() : tree.getClampingThresMinLog();
-      tree.setNodeValue(VoxelAt(key, i), log_odds, /*lazy_eval=*/true);
-    }
-  }
-  tree.updateInnerOccupancy();
+  FillTree(blocks_, tree, [](octomap::OcTreeNode&, BlockKey, size_t) {});
   std::ostringstream file;
   tree.writeBinary(file);  // prunes
+  return file.str();
+}
+
+std::string OccupancyStates::ColorTreeFile() const {
+  octomap::ColorOcTree tree(resolution_);
+  FillTree(blocks_, tree, [&](octomap::ColorOcTreeNode& node, BlockKey key, size_t number) {
+    const auto colors = colors_.find(key);
+    if (colors == colors_.end()) return;
+    const Rgb& color = colors->second[number];
+    node.setColor(color.red, color.green, color.blue);
+  });
+  tree.prune();
+  std::ostringstream file;
+  tree.write(file);
   return file.str();
 }
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "messages/occupancy_types.h"
 #include "occupancy/voxel_blocks.h"
@@ -22,9 +23,9 @@ class OccupancyStates {
   // `resolution`: edge of a voxel, m (mono: units of the map).
   explicit OccupancyStates(double resolution) : resolution_(resolution) {}
 
-  // Blocks replace what was known of theirs.
-  void Set(std::span<const OccupancyBlock> blocks);
-  void Clear() { blocks_.clear(); }
+  // Blocks replace what was known of theirs. `colors`: of their occupied voxels, in their order; empty: not known.
+  void Set(std::span<const OccupancyBlock> blocks, std::span<const Rgb> colors = {});
+  void Clear();
 
   double resolution() const { return resolution_; }
   // By key; none is empty.
@@ -35,10 +36,13 @@ class OccupancyStates {
 
   // OctoMap's binary file (`.bt`): voxels are free, occupied or not there.
   std::string BinaryTreeFile() const;
+  // OctoMap's file of a ColorOcTree (`.ot`): likewise, and the colors of the occupied ones, white where not known.
+  std::string ColorTreeFile() const;
 
  private:
   double resolution_;
   std::map<BlockKey, OccupancyBlock> blocks_;
+  std::map<BlockKey, std::vector<Rgb>> colors_;  // of the occupied voxels of those whose colors are known
 };
 
 }  // namespace tessera

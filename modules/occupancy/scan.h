@@ -29,6 +29,7 @@ struct Scan {
   std::vector<Rgb> landmark_colors;                  // of each, or empty: not known
 
   bool operator==(const Scan&) const = default;
+  bool is_colored() const { return !color.empty() || !landmark_colors.empty(); }
 };
 
 // From the depth image of an RGB-D frame, or from the two images of a stereo frame by semi-global matching of

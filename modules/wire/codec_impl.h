@@ -126,9 +126,9 @@ Result<Value*> ValueJoiner<Value>::Add(ByteView message, const MessageHeader& he
   }
   const bool is_last = header.part + 1 == header.num_parts;
   if (header.part == 0) state.value = {};
-  state.reader.BeginPart(header.part == 0);
+  state.reader.BeginPart(header.part == 0, is_last);
   Layout<Message>::Describe(state.reader, std::as_const(state.message), state.value);
-  TESSERA_RETURN_IF_FAILED(state.reader.EndPart(is_last));
+  TESSERA_RETURN_IF_FAILED(state.reader.EndPart());
   if (is_last) return &state.value;
   state.next_part = header.part + 1;
   state.num_parts = header.num_parts;

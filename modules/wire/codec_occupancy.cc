@@ -14,6 +14,12 @@ bool AreKnownStates(const OccupancyBlock& block) {
                       [](uint8_t states) { return (states & (states >> 1) & kLowBits) != 0; });
 }
 
+size_t NumOccupied(const std::vector<OccupancyBlock>& blocks) {
+  size_t num = 0;
+  for (const OccupancyBlock& block : blocks) num += block.NumOccupied();
+  return num;
+}
+
 }  // namespace
 
 template <>
@@ -43,6 +49,9 @@ struct Layout<occupancy_t> {
     fields.Check(update.number >= 0, "its number is negative");
     fields.Check(IsScale(update.resolution), "its resolution is out of range");
     fields.List(message.num_blocks, message.blocks, update.blocks);
+    fields.List(message.num_colors, message.colors, update.colors);
+    fields.CheckWhole([&] { return update.colors.empty() || update.colors.size() == NumOccupied(update.blocks); },
+                      "some of its occupied voxels have a color and others none");
   }
 };
 TESSERA_CODEC(OccupancyUpdate, occupancy_t);

@@ -23,6 +23,7 @@
 #include "tessera/descriptor_t.hpp"
 #include "tessera/feature_options_t.hpp"
 #include "tessera/rect_t.hpp"
+#include "tessera/rgb_t.hpp"
 #include "tessera/rigid3_t.hpp"
 #include "tessera/sim3_t.hpp"
 
@@ -108,6 +109,16 @@ void WriteField(const CameraCalibration& calibration, camera_model_t& field);
 Result<> ReadField(const camera_model_t& field, CameraCalibration& calibration);
 void WriteField(const FeatureOptions& options, feature_options_t& field);
 Result<> ReadField(const feature_options_t& field, FeatureOptions& options);
+
+inline void WriteField(const Rgb& color, rgb_t& field) {
+  field.red = color.red;
+  field.green = color.green;
+  field.blue = color.blue;
+}
+inline Result<> ReadField(const rgb_t& field, Rgb& color) {
+  color = {field.red, field.green, field.blue};
+  return {};
+}
 
 void WriteField(const Rect& rect, rect_t& field);
 Result<> ReadField(const rect_t& field, Rect& rect);  // any numbers: see IsInside

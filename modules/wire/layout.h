@@ -22,6 +22,7 @@
 //   fields.Bits(field, member)        64 bits of any content
 //   fields.Implied(member, constant)  what the type of the message says
 //   fields.Check(holds, sentence)     a condition on what was read before it; must be safe for any numbers
+//   fields.CheckWhole(holds, sentence)   a condition, to be called, on the whole value: once its last part was read
 //   fields.Once(num, items, value)    an item with a layout of its own, in the first part alone
 //   fields.List(num, items, members)  a list of items, each a leaf or a message with a layout
 //   fields.CutList(num, items, members)              items that have a WholeTable, within which they may be cut

@@ -16,16 +16,17 @@ namespace tessera {
 
 class PartReader {
  public:
-  // `begins`: the first part of a value.
-  void BeginPart(bool begins) {
+  // `begins`: the first part of a value. `ends`: its last one.
+  void BeginPart(bool begins, bool ends) {
     begins_ = begins;
+    ends_ = ends;
     is_incomplete_ = false;
     if (begins) is_item_cut_ = false;
     verdict_ = {};
   }
   // What is wrong with the part that was described. After the last one, nothing may be missing.
-  Result<> EndPart(bool is_last) {
-    if (is_last) Check(!is_incomplete_ && !is_item_cut_, "not all of it came");
+  Result<> EndPart() {
+    if (ends_) Check(!is_incomplete_ && !is_item_cut_, "not all of it came");
     return std::move(verdict_);
   }
 
@@ -61,6 +62,10 @@ class PartReader {
   void Check(bool holds, const char* sentence) {
     if (!holds && verdict_) verdict_ = Failed(sentence);
   }
+  template <class Holds>
+  void CheckWhole(Holds holds, const char* sentence) {
+    if (ends_ && verdict_) Check(holds(), sentence);
+  }
   // Made at the beginning, and shared with nobody before the value is complete.
   template <class Pointee>
   Pointee& Target(std::shared_ptr<const Pointee>& pointer) {
@@ -91,10 +96,10 @@ class PartReader {
     for (size_t i = 0; i < static_cast<size_t>(num) && verdict_; ++i) {
       if (!is_item_cut_) members.emplace_back();
       PartReader part;
-      part.BeginPart(!is_item_cut_);
+      part.BeginPart(!is_item_cut_, false);
       part(items[i], members.back());
       is_item_cut_ = part.is_incomplete_;
-      verdict_ = part.EndPart(false);
+      verdict_ = part.EndPart();
       Check(!is_item_cut_ || i + 1 == static_cast<size_t>(num), kUnfit);
     }
   }
@@ -153,6 +158,7 @@ class PartReader {
   static constexpr size_t kMaxCutItems = size_t{1} << 16;
 
   bool begins_ = true;
+  bool ends_ = false;
   bool is_incomplete_ = false;  // a WholeTable or the Bands of the last part lack something
   bool is_item_cut_ = false;    // the last item of a CutList does
   Result<> verdict_;

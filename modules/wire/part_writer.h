@@ -52,6 +52,8 @@ class PartWriter {
   template <class Member>
   void Implied(const Member& /*member*/, const Member& /*constant*/) {}
   void Check(bool /*holds*/, const char* /*sentence*/) {}
+  template <class Holds>
+  void CheckWhole(const Holds& /*holds*/, const char* /*sentence*/) {}
   template <class Pointee>
   const Pointee& Target(const std::shared_ptr<const Pointee>& pointer) {
     return *pointer;

@@ -214,6 +214,57 @@ TEST(CameraSession, TellsTheColorsOfKeyframes) {
   }
 }
 
+// A camera that was started again and hears first that frames 0 .. 8 are tracked, of which 2, 5 and 8 are keyframes.
+CameraSession StartedAgain(SourceOpener open_again) {
+  CameraSession session(std::make_unique<FakeSource>(20, false, -1),
+                        {{.lockstep_window = 3}, true, 10, /*with_color=*/true}, 0, std::move(open_again));
+  for (int64_t frame = 0; frame < 9; ++frame) {
+    EXPECT_THAT(session.MarkTracked({frame}, frame * kFrameUs, 0), IsSuccess());
+    const bool is_keyframe = frame % 3 == 2;
+    if (is_keyframe) EXPECT_TRUE(session.TellColor({frame}, frame * kFrameUs).empty()) << "it is read later";
+  }
+  return session;
+}
+
+TEST(CameraSession, StartedAgainItReadsTheColorsOfKeyframesBeforeOnceMore) {
+  std::vector<int64_t> opened;
+  CameraSession session = StartedAgain([&](FrameId first) {
+    opened.push_back(first.value);
+    return std::make_unique<FakeSource>(20, false, -1);
+  });
+  for (const auto& [frame, width] : {std::pair(2, 2), {5, 0}, {8, 8}}) {  // odd ones are unreadable
+    const std::vector<ColorFrame> colors = AllOf<ColorFrame>(session.TellMissedColor());
+    ASSERT_EQ(colors.size(), 1U);
+    const ColorImage image = width > 0 ? ColorImage(width, 1) : ColorImage();
+    EXPECT_EQ(colors[0], (ColorFrame{.id = {frame}, .utime_us = frame * kFrameUs, .image = image}));
+  }
+  EXPECT_TRUE(session.TellMissedColor().empty());
+  EXPECT_EQ(opened, Frames{2});
+  EXPECT_EQ(SendAll(session), (Frames{9, 10, 11})) << "its own frames go as if there had been nothing";
+}
+
+TEST(CameraSession, ASourceThatIsGoneHasNoColorsAnyMore) {
+  CameraSession session = StartedAgain([](FrameId) -> std::unique_ptr<FrameSource> { throw InputError("gone"); });
+  for (const int64_t frame : {2, 5, 8}) {
+    const std::vector<ColorFrame> colors = AllOf<ColorFrame>(session.TellMissedColor());
+    ASSERT_EQ(colors.size(), 1U);
+    EXPECT_EQ(colors[0], (ColorFrame{.id = {frame}, .utime_us = frame * kFrameUs}));
+  }
+}
+
+TEST(CameraSession, OfManyKeyframesBeforeTheNewestAreReadAgain) {
+  CameraSession session(std::make_unique<FakeSource>(900, false, -1), {{}, true, 10, /*with_color=*/true}, 0,
+                        [](FrameId) { return std::make_unique<FakeSource>(900, false, -1); });
+  constexpr auto kMax = static_cast<int64_t>(CameraSession::kMaxColors);
+  for (int64_t frame = 0; frame < 2 * kMax + 4; frame += 2) {
+    ASSERT_THAT(session.MarkTracked({frame}, frame * kFrameUs, 0), IsSuccess());
+    const std::vector<ColorFrame> dropped = AllOf<ColorFrame>(session.TellColor({frame}, frame * kFrameUs));
+    ASSERT_EQ(dropped.size(), frame < 2 * kMax ? 0U : 1U);
+    if (!dropped.empty()) EXPECT_EQ(dropped[0].id.value, frame - 2 * kMax);
+  }
+  EXPECT_EQ(AllOf<ColorFrame>(session.TellMissedColor()).at(0).id, FrameId{4});
+}
+
 TEST(CameraSession, WhereNobodyTracksAllFramesHaveTheirColorInFrontOfThem) {
   CameraSession session(std::make_unique<FakeSource>(3, false, -1), {{}, false, 0, /*with_color=*/true}, 0);
   std::vector<std::string> sent;

@@ -3,7 +3,7 @@
 World and camera axes: x right, y down, z forward; meters.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,11 @@ PILLAR_LOW = np.array([-0.6, -2.0, 5.0])
 PILLAR_HIGH = np.array([0.6, 2.0, 6.2])
 TEXELS_PER_M = 60
 TEXTURE_SIZE = 1024
+
+# What the walls of make_walls() are painted with, where they are in color: shares of red, green and blue, in tenths.
+PAINTS = [(10, 4, 4), (4, 10, 4), (4, 4, 10), (10, 10, 3), (3, 10, 10)]
+PAINTS += [(10, 3, 10), (10, 6, 2), (2, 6, 10), (6, 10, 2), (9, 9, 9)]
+TINTS = 0.1 * np.array(PAINTS)  # walls x 3
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,13 @@ def render(walls: list[Wall], world_from_camera: np.ndarray) -> np.ndarray:
     return np.clip(np.round(image), 0, 255).astype(np.uint8)
 
 
+def render_in_color(walls: list[Wall], world_from_camera: np.ndarray) -> np.ndarray:
+    """Likewise, with painted walls: HEIGHT_PX x WIDTH_PX x 3."""
+    numbered = [replace(wall, texture=np.full_like(wall.texture, number)) for number, wall in enumerate(walls)]
+    paint = TINTS[render(numbered, world_from_camera)]
+    return np.round(paint * render(walls, world_from_camera)[..., None]).astype(np.uint8)
+
+
 def pose_at(frame: int) -> np.ndarray:
     """world_from_camera, 3x4: sideways and forward in a bow, turning a little."""
     yaw = 0.15 * np.sin(0.04 * frame)
@@ -100,21 +112,25 @@ def pose_at(frame: int) -> np.ndarray:
     return np.column_stack([rotation, position])
 
 
-def write_pgm(path: Path, image: np.ndarray) -> None:
-    path.write_bytes(f"P5 {image.shape[1]} {image.shape[0]} 255\n".encode() + image.tobytes())
+def write_image(path: Path, image: np.ndarray) -> None:
+    """As PGM, or in color as PPM; `path` has no ending."""
+    kind, ending = ("P5", ".pgm") if image.ndim == 2 else ("P6", ".ppm")
+    header = f"{kind} {image.shape[1]} {image.shape[0]} 255\n"
+    path.with_suffix(ending).write_bytes(header.encode() + image.tobytes())
 
 
-def write_sequence(folder: Path, num_frames: int) -> Path:
+def write_sequence(folder: Path, num_frames: int, with_color: bool = False) -> Path:
     """The sequence in KITTI's layout, as a stereo pair, with poses.txt inside. Returns the folder."""
     walls = make_walls()
+    draw = render_in_color if with_color else render
     right_from_left = np.array([BASELINE_M, 0.0, 0.0])
     for camera in ("image_0", "image_1"):
         (folder / camera).mkdir(parents=True)
     poses = [pose_at(frame) for frame in range(num_frames)]
     for frame, pose in enumerate(poses):
         right_pose = np.column_stack([pose[:, :3], pose[:, 3] + pose[:, :3] @ right_from_left])
-        write_pgm(folder / "image_0" / f"{frame:06d}.pgm", render(walls, pose))
-        write_pgm(folder / "image_1" / f"{frame:06d}.pgm", render(walls, right_pose))
+        write_image(folder / "image_0" / f"{frame:06d}", draw(walls, pose))
+        write_image(folder / "image_1" / f"{frame:06d}", draw(walls, right_pose))
     left = f"{FOCAL_PX} 0 {CENTER_PX[0]} {{}} 0 {FOCAL_PX} {CENTER_PX[1]} 0 0 0 1 0"
     (folder / "calib.txt").write_text(f"P0: {left.format(0)}\nP1: {left.format(-FOCAL_PX * BASELINE_M)}\n")
     (folder / "times.txt").write_text("".join(f"{FRAME_PERIOD_S * frame:.6f}\n" for frame in range(num_frames)))

@@ -69,6 +69,40 @@ TEST_F(LandmarkColorsTest, KeyframesOfALoadedMapAreNotThoseOfThisRun) {
   EXPECT_EQ(Color(), std::nullopt);
 }
 
+TEST_F(LandmarkColorsTest, WhoJoinsLateColorsTheKeyframesOfTheSnapshotWhicheverComesFirst) {
+  for (const bool is_image_first : {false, true}) {
+    map_ = Map();
+    colors_ = LandmarkColors(/*joins_late=*/true);
+    if (is_image_first) colors_.Receive(Painted(10, kRed));
+    AddKeyframe(0, /*is_snapshot=*/true);
+    if (!is_image_first) colors_.Receive(Painted(10, kRed));
+    EXPECT_EQ(Color(), kRed) << is_image_first;
+    AddKeyframe(1);
+    colors_.Receive(Painted(20, kGreen));
+    EXPECT_EQ(Color(), (Rgb{100, 60, 25})) << is_image_first;
+  }
+}
+
+TEST_F(LandmarkColorsTest, AnImageOfAnotherTimeIsOfAnotherKeyframe) {
+  colors_ = LandmarkColors(/*joins_late=*/true);
+  AddKeyframe(0, /*is_snapshot=*/true);
+  ColorFrame later = Painted(10, kRed);
+  later.utime_us = 5;
+  colors_.Receive(later);
+  EXPECT_EQ(Color(), std::nullopt);
+}
+
+TEST_F(LandmarkColorsTest, ImagesThatWaitHaveABound) {
+  constexpr int kSide = 4096;  // px: 48 MB
+  for (const int64_t frame : {10, 20, 30}) {
+    colors_.Receive(ColorFrame{.id = {frame}, .image = ColorImage(kSide, kSide, kRed)});
+  }
+  AddKeyframe(0);
+  EXPECT_EQ(Color(), std::nullopt) << "the oldest is gone";
+  AddKeyframe(1);
+  EXPECT_EQ(Color(), kRed);
+}
+
 TEST_F(LandmarkColorsTest, ItIsCompleteWhenAllKeyframesAreAnswered) {
   EXPECT_TRUE(colors_.is_complete());
   colors_.Expect({10});

@@ -134,6 +134,48 @@ TEST(OccupancyMap, OnlyWhatChangedIsTold) {
   EXPECT_TRUE(told.blocks().empty());
 }
 
+constexpr Rgb kRed{200, 10, 0}, kBlue{0, 10, 100};
+
+TEST(OccupancyMap, OccupiedVoxelsAreToldWithTheirColorsOnceAScanIsInColor) {
+  const Rigid3 pose = ViewsOfRoom(1)[0].world_from_camera;
+  OccupancyMap map(RoomOptions());
+  map.Put({0}, ScanOfRoom(pose), pose);
+  std::vector<OccupancyBlock> blocks = map.TakeChangedBlocks();
+  EXPECT_THAT(map.ColorsOf(blocks), testing::IsEmpty()) << "all is gray";
+  map.Put({0}, ScanOfRoom(pose, Painted(kRed)), pose);
+  EXPECT_EQ(map.TakeChangedBlocks(), blocks) << "the same states, in color now, also those of free space";
+  const int64_t num_occupied = StatesOf(map).Num(VoxelState::kOccupied);
+  EXPECT_EQ(map.ColorsOf(blocks), std::vector<Rgb>(static_cast<size_t>(num_occupied), kRed));
+  map.Put({1}, ScanOfRoom(pose, Painted(kBlue)), pose);
+  blocks = map.TakeChangedBlocks();
+  EXPECT_THAT(blocks, testing::Each(testing::ResultOf([](const auto& b) { return b.NumOccupied(); }, testing::Gt(0))));
+  EXPECT_EQ(map.ColorsOf(blocks), std::vector<Rgb>(static_cast<size_t>(num_occupied), (Rgb{100, 10, 50})));
+  EXPECT_THAT(map.TakeChangedBlocks(), testing::IsEmpty());
+}
+
+TEST(OccupancyStates, KeepsTheColorsOfBlocksAndWritesThemForOctomap) {
+  const Rigid3 pose = ViewsOfRoom(1)[0].world_from_camera;
+  OccupancyMap map(RoomOptions());
+  map.Put({0}, ScanOfRoom(pose, Painted(kRed)), pose);
+  const std::vector<OccupancyBlock> blocks = map.Blocks();
+  OccupancyStates states(map.options().resolution);
+  const auto color_of_wall = [&] {
+    std::istringstream file(states.ColorTreeFile());
+    const std::unique_ptr<octomap::AbstractOcTree> read(octomap::AbstractOcTree::read(file));
+    auto* const tree = dynamic_cast<octomap::ColorOcTree*>(read.get());
+    EXPECT_NE(tree, nullptr);
+    octomap::ColorOcTreeNode* const wall = tree == nullptr ? nullptr : tree->search(0.0, 0.0, kRoomHalf + 0.01);
+    EXPECT_TRUE(wall != nullptr && tree->isNodeOccupied(wall));
+    return wall == nullptr ? octomap::ColorOcTreeNode::Color() : wall->getColor();
+  };
+  states.Set(blocks, map.ColorsOf(blocks));
+  EXPECT_EQ(color_of_wall(), octomap::ColorOcTreeNode::Color(kRed.red, kRed.green, kRed.blue));
+  states.Set(blocks);
+  EXPECT_EQ(color_of_wall(), octomap::ColorOcTreeNode::Color(255, 255, 255)) << "not known any more";
+  states.Clear();
+  EXPECT_TRUE(states.blocks().empty());
+}
+
 TEST(OccupancyMap, OctomapReadsItsFiles) {
   const OccupancyMap map = MapOf(ViewsOfRoom(8));
   const OccupancyStates states = StatesOf(map);

@@ -257,10 +257,7 @@ OccupancySessionOptions ColorOptions() {
   return options;
 }
 
-ColorFrame Painted(KeyframeId id) {
-  return {.id = Turn::FrameOf(id),
-          .image = ColorImage(kDepthCamera.width_px, kDepthCamera.height_px, {.red = 200, .green = 100, .blue = 50})};
-}
+ColorFrame Painted(KeyframeId id) { return {.id = Turn::FrameOf(id), .image = Painted(Rgb{200, 100, 50})}; }
 
 TEST(OccupancySession, ScansWaitForTheirColors) {
   Turn turn(ColorOptions());

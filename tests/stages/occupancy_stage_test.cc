@@ -20,6 +20,7 @@ namespace tessera {
 namespace {
 
 constexpr int64_t kNumKeyframes = 6;
+constexpr Rgb kPaint{200, 100, 50};
 const std::vector<std::string> kFiles = {"occupancy.bt", "occupancy.ot", "occupancy.pgm", "occupancy.yaml"};
 
 Rigid3 PoseOf(int64_t keyframe) { return CameraAt({0.1, 0.0, -0.2}, 0.4 * static_cast<double>(keyframe)); }
@@ -32,6 +33,7 @@ class Publishers {
         tracker_(bus.AddContext("tracker")),
         mapper_(bus.AddContext("mapper")),
         frames_(camera_.Advertise(kCamera)),
+        colors_(camera_.Advertise(kColor)),
         poses_(tracker_.Advertise(kPose)),
         keyframes_(tracker_.Advertise(kKeyframe)),
         deltas_(mapper_.Advertise(kMapDelta)),
@@ -59,6 +61,8 @@ class Publishers {
     delta.new_keyframes.push_back({{id}, {id - 1}, PoseOf(id), std::make_shared<FeatureFrame>(keyframe.features)});
     Send(delta);
   }
+  // An empty image: there is none.
+  void SendColor(int64_t id, const ColorImage& image) { colors_.Publish({.id = {2 * id}, .image = image}); }
   void MoveAll() {
     MapDelta delta;
     delta.answers = {kNumKeyframes - 1};
@@ -92,6 +96,7 @@ class Publishers {
   StageContext& tracker_;
   StageContext& mapper_;
   Publisher<CameraFrame> frames_;
+  Publisher<ColorFrame> colors_;
   Publisher<PoseEstimate> poses_;
   Publisher<KeyframeObservation> keyframes_;
   Publisher<MapDelta> deltas_;
@@ -156,13 +161,36 @@ TEST(OccupancyStage, TheMapWriterWritesWhatItKnowsOfARunningStack) {
   for (int64_t id = 0; id < kNumKeyframes; ++id) publishers.SendKeyframe(id);
   bus.RunUntilQuiet();
   bus.Start<MapWriterStage>("tree_writer", 0, {"map_writer.path=" + folder.File("now.bt")});
+  bus.Start<MapWriterStage>("color_writer", 0, {"map_writer.path=" + folder.File("now.ot")});
   bus.Start<MapWriterStage>("grid_writer", 0, {"map_writer.path=" + folder.File("now.pgm")});
   const auto exists = [&](const std::string& name) { return std::filesystem::exists(folder.File(name)); };
-  ASSERT_TRUE(bus.RunUntil([&] { return exists("now.bt") && exists("now.pgm") && exists("now.yaml"); }));
+  ASSERT_TRUE(
+      bus.RunUntil([&] { return exists("now.bt") && exists("now.ot") && exists("now.pgm") && exists("now.yaml"); }));
   OccupancyStates states(RoomOptions().resolution);
   states.Set(publishers.Expected().Blocks());
   EXPECT_EQ(ReadFile(folder.File("now.bt")), states.BinaryTreeFile());
+  EXPECT_EQ(ReadFile(folder.File("now.ot")), states.ColorTreeFile());
   EXPECT_THAT(ReadFile(folder.File("now.yaml")), testing::HasSubstr("image: now.pgm\n"));
+}
+
+TEST(OccupancyStage, TellsColorsWhereTheRunHasThem) {
+  for (const bool has_color : {false, true}) {
+    const RunFolder folder;
+    Settings settings = RoomSettings(folder);
+    settings.Override("camera.color=true");
+    MemoryBus bus(settings);
+    Publishers publishers(bus);
+    std::vector<OccupancyUpdate> told;
+    bus.AddContext("listener").Subscribe(kOccupancy, [&](const OccupancyUpdate& update) { told.push_back(update); });
+    bus.Start<OccupancyStage>("occupancy");
+    publishers.SendKeyframe(0);
+    publishers.SendColor(0, has_color ? Painted(kPaint) : ColorImage());
+    ASSERT_TRUE(bus.RunUntil([&] { return !told.empty(); }));
+    size_t num_occupied = 0;
+    for (const OccupancyBlock& block : told.front().blocks) num_occupied += block.NumOccupied();
+    EXPECT_GT(num_occupied, 0U);
+    EXPECT_EQ(told.front().colors, std::vector<Rgb>(has_color ? num_occupied : 0, kPaint));
+  }
 }
 
 TEST(OccupancyStage, WithoutOneTheMapWriterSaysSo) {

@@ -51,9 +51,11 @@ inline CameraFrame DepthFrameOf(const Rigid3& world_from_camera) {
   return frame;
 }
 
-inline OccupancyMap::SharedScan ScanOfRoom(const Rigid3& world_from_camera) {
+// `color`: its left image in color; empty: that is gray.
+inline OccupancyMap::SharedScan ScanOfRoom(const Rigid3& world_from_camera, const ColorImage& color = {}) {
   return std::make_shared<const Scan>(
-      ScanFromImages(DepthFrameOf(world_from_camera), {}, kDepthCamera, RoomOptions(), /*max_disparity_px=*/0));
+      ScanFromImages(DepthFrameOf(world_from_camera), color, kDepthCamera, RoomOptions(), /*max_disparity_px=*/0));
 }
+inline ColorImage Painted(const Rgb& color) { return {kDepthCamera.width_px, kDepthCamera.height_px, color}; }
 
 }  // namespace tessera

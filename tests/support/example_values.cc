@@ -441,7 +441,8 @@ OccupancyUpdate DrawValue<OccupancyUpdate>(std::mt19937& generator, int size) {
                          .resolution = DrawReal(generator, 0.01, 1.0),
                          .is_whole = Draw(generator, 0, 1) == 1,
                          .num_keyframes = Draw(generator, 0, 99),
-                         .blocks = {}};
+                         .blocks = {},
+                         .colors = {}};
   const int num_blocks = size == 0 ? 0 : 150;
   for (int i = 0; i < num_blocks; ++i) {
     OccupancyBlock block{.x = Draw(generator, -2048, 2047), .y = Draw(generator, -9, 9), .z = i};
@@ -449,6 +450,11 @@ OccupancyUpdate DrawValue<OccupancyUpdate>(std::mt19937& generator, int size) {
       block.Set(voxel, static_cast<VoxelState>(Draw(generator, 0, 2)));
     }
     update.blocks.push_back(block);
+    const size_t num_colors = update.is_whole ? block.NumOccupied() : 0;
+    for (size_t voxel = 0; voxel < num_colors; ++voxel) {
+      const auto draw = [&] { return static_cast<uint8_t>(Draw(generator, 0, 255)); };
+      update.colors.push_back({.red = draw(), .green = draw(), .blue = draw()});
+    }
   }
   return update;
 }

@@ -203,6 +203,13 @@ TEST(Codec, OccupancyOutOfRangeIsRefused) {
   ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.blocks.back().z = 2048; });
   ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.blocks[0].x = -2049; });
   ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) { update.blocks[0].states[1023] = 0x0C; });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) {
+    update.colors.assign(7, Rgb());  // of more voxels
+  });
+  ExpectRefused<OccupancyUpdate>([](OccupancyUpdate& update) {
+    update.blocks.clear();
+    update.colors.assign(1, Rgb());
+  });
   ExpectRefused<OccupancyRequest>([](OccupancyRequest& request) { request.num_asked = -1; });
 }
 

@@ -11,26 +11,36 @@
 namespace tessera {
 namespace {
 
-std::unique_ptr<FrameSource> Open(const Settings& settings) {
+bool IsDevice(const std::string& source) { return source.starts_with("camera:"); }
+bool IsLive(const std::string& source) { return IsDevice(source) || source.starts_with("rtsp"); }
+
+// `first_frame`: of those that the settings name.
+std::unique_ptr<FrameSource> Open(const Settings& settings, int64_t first_frame) {
   const auto camera = settings.Get<CameraSettings>();
   SourceOptions options;
   options.source = camera.source;
   options.sensor = ParseSensor(camera.sensor);
   options.calibration_path = camera.calibration;
   options.depth_unit_m = camera.depth_unit_m;
-  options.first_frame = camera.first_frame;
+  options.first_frame = first_frame;
   options.last_frame = camera.last_frame;
   options.with_color = camera.color;
-  if (const bool is_device = options.source.starts_with("camera:"); is_device || options.source.starts_with("rtsp")) {
+  if (IsLive(options.source)) {
     SourceOptions all = options;
     all.first_frame = 0;
     all.last_frame = -1;
-    return std::make_unique<LiveSource>([all] { return OpenSource(all); },
-                                        LiveSourceOptions{is_device, options.first_frame, options.last_frame});
+    return std::make_unique<LiveSource>(
+        [all] { return OpenSource(all); },
+        LiveSourceOptions{IsDevice(options.source), options.first_frame, options.last_frame});
   }
   return options.source.starts_with("log:")
              ? OpenLog(options, settings.Get<BusSettings>().channel_prefix, settings.Get<TrackerSettings>().live)
              : OpenSource(options);
+}
+
+SourceOpener OpenerOf(const Settings& settings) {
+  if (IsLive(settings.Get<CameraSettings>().source)) return nullptr;
+  return [&settings](FrameId first) { return Open(settings, first.value); };
 }
 
 CameraSessionOptions OptionsFrom(const Settings& settings) {
@@ -49,7 +59,8 @@ CameraSessionOptions OptionsFrom(const Settings& settings) {
 
 CameraStage::CameraStage(StageContext& context)
     : context_(context),
-      session_(Open(context.settings()), OptionsFrom(context.settings()), context.now_us()),
+      session_(Open(context.settings(), context.settings().Get<CameraSettings>().first_frame),
+               OptionsFrom(context.settings()), context.now_us(), OpenerOf(context.settings())),
       calibration_(context.Advertise(kCalibration)),
       ground_truth_(context.Advertise(kGroundTruth)),
       frames_(context.Advertise(kCamera)),
@@ -86,6 +97,10 @@ void CameraStage::TellEvents() {
 
 // Returns whether to continue at once.
 bool CameraStage::Step() {
+  if (const CameraActions missed = session_.TellMissedColor(); !missed.empty()) {
+    Do(missed);
+    return true;
+  }
   const CameraSession::State state = session_.Look(context_.now_us());
   if (state == CameraSession::State::kWaits) {
     if (const auto look_us = session_.NextLookUs(context_.now_us())) context_.WakeAt(*look_us);

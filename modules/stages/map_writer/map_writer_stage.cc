@@ -1,5 +1,6 @@
 #include "stages/map_writer/map_writer_stage.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -14,6 +15,15 @@ namespace {
 // An occupancy stage answers between two scans.
 constexpr std::chrono::milliseconds kAskAgain{500};
 constexpr int64_t kMaxAsked = 20;
+// No color for so long: the run is gray, or its camera has ended. Streams tell more often what they have.
+constexpr int64_t kNoColorUs = 2'000'000;
+// In which a camera can have told all that it keeps; a map that was loaded may have later frames than the run.
+constexpr int64_t kMaxWaitForColorsUs = 10'000'000;
+constexpr std::chrono::milliseconds kLookAgain{100};
+// A mapper answers who comes late with an old snapshot and the deltas behind it, one after the other: the map is that
+// of now when none has come for so long, or after so long in all, where new ones never stop.
+constexpr int64_t kQuietUs = 400'000;
+constexpr int64_t kMaxCatchUpUs = 3'000'000;
 
 std::string PathFrom(const Settings& settings) {
   auto path = settings.Get<MapWriterSettings>().path;
@@ -39,7 +49,11 @@ MapWriterStage::MapWriterStage(StageContext& context)
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); }, [this] { WriteIfDone(); }) {
   map_.FollowToEnd();
-  if (kind_ == Kind::kLandmarks) return;
+  if (kind_ == Kind::kLandmarks) {
+    context.Subscribe(kColor, [this](const ColorFrame& color) { Receive(color); });
+    context.Every(kLookAgain, [this] { WriteIfDone(); });
+    return;
+  }
   if (follows_) {
     throw InputError("map_writer.follow is for PLY files: at the end of a run, its folder holds the occupancy map");
   }
@@ -54,6 +68,7 @@ MapWriterStage::MapWriterStage(StageContext& context)
 MapWriterStage::Kind MapWriterStage::KindOf(const std::string& path) {
   const std::string ending = std::filesystem::path(path).extension().string();
   if (ending == ".bt") return Kind::kOccupancyTree;
+  if (ending == ".ot") return Kind::kColorTree;
   return ending == ".pgm" ? Kind::kOccupancyGrid : Kind::kLandmarks;
 }
 
@@ -68,14 +83,38 @@ void MapWriterStage::AskForOccupancy() {
 Result<> MapWriterStage::Apply(const MapDelta& delta) {
   TESSERA_RETURN_IF_FAILED(replica_.Apply(delta));
   context_.SetValue("deltas", static_cast<double>(replica_.next_delta()));
+  colors_.Receive(delta);
+  last_delta_us_ = context_.now_us();
+  if (!map_since_us_) map_since_us_ = last_color_us_ = last_delta_us_;
+  if (!delta.new_keyframes.empty()) newest_keyframe_ = delta.new_keyframes.back().features->frame;
   return {};
+}
+
+void MapWriterStage::Receive(const ColorFrame& color) {
+  colors_.Receive(color);
+  newest_color_ = std::max(newest_color_, color.id);
+  last_color_us_ = context_.now_us();
+  WriteIfDone();
+}
+
+bool MapWriterStage::HasCaughtUp() const {
+  const int64_t now_us = context_.now_us();
+  return map_.is_complete() || now_us - last_delta_us_ >= kQuietUs ||
+         now_us - map_since_us_.value_or(now_us) >= kMaxCatchUpUs;
+}
+
+// As far as the camera still has them: it tells one of each keyframe, in their order.
+bool MapWriterStage::HasColors() const {
+  const int64_t now_us = context_.now_us();
+  return newest_color_ >= newest_keyframe_ || now_us - last_color_us_ >= kNoColorUs ||
+         now_us - map_since_us_.value_or(now_us) >= kMaxWaitForColorsUs;
 }
 
 // Each delta brought the owner's hash, and Apply() compared it: a replica that is not rejected has the owner's map.
 void MapWriterStage::WriteIfDone() {
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
   if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
-  if (kind_ != Kind::kLandmarks && !occupancy_) return;
+  if (kind_ == Kind::kLandmarks ? !HasCaughtUp() || !HasColors() : !occupancy_) return;
   try {
     Write();
   } catch (const InputError& error) {
@@ -95,7 +134,7 @@ void MapWriterStage::Write() const {
 }
 
 void MapWriterStage::WriteLandmarks() const {
-  WriteFile(path_, PlyFile(replica_, {}, context_.settings().Get<BodySettings>().BaseFromCamera()));
+  WriteFile(path_, PlyFile(replica_, colors_, context_.settings().Get<BodySettings>().BaseFromCamera()));
   std::printf("map after delta %lld: %lld keyframes, %lld landmarks, hash %016llx as the mapper's, SHA-256 %s\n",
               static_cast<long long>(replica_.next_delta() - 1), static_cast<long long>(replica_.keyframes().size()),
               static_cast<long long>(replica_.landmarks().size()), static_cast<unsigned long long>(replica_.hash()),
@@ -104,9 +143,11 @@ void MapWriterStage::WriteLandmarks() const {
 
 void MapWriterStage::WriteOccupancy() const {
   OccupancyStates states(occupancy_->resolution);
-  states.Set(occupancy_->blocks);
+  states.Set(occupancy_->blocks, occupancy_->colors);
   if (kind_ == Kind::kOccupancyTree) {
     WriteFile(path_, states.BinaryTreeFile());
+  } else if (kind_ == Kind::kColorTree) {
+    WriteFile(path_, states.ColorTreeFile());
   } else {
     std::vector<Rigid3> path;
     replica_.keyframes().ForEach(

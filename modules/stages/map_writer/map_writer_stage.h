@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "map/landmark_colors.h"
 #include "map/map.h"
 #include "messages/occupancy_types.h"
 #include "occupancy/occupancy_grid.h"
@@ -21,11 +22,14 @@ class MapWriterStage {
 
  private:
   // What is written, by the ending of the file's name.
-  enum class Kind { kLandmarks, kOccupancyTree, kOccupancyGrid };
+  enum class Kind { kLandmarks, kOccupancyTree, kColorTree, kOccupancyGrid };
   static Kind KindOf(const std::string& path);
 
   void AskForOccupancy();
   Result<> Apply(const MapDelta& delta);
+  void Receive(const ColorFrame& color);
+  bool HasCaughtUp() const;
+  bool HasColors() const;
   void WriteIfDone();
   void Write() const;
   void WriteLandmarks() const;
@@ -38,6 +42,11 @@ class MapWriterStage {
   const HeightBand band_;
   MapSubscription map_;
   Map replica_;
+  LandmarkColors colors_{/*joins_late=*/true};
+  FrameId newest_keyframe_, newest_color_;
+  std::optional<int64_t> map_since_us_;
+  int64_t last_delta_us_ = 0;
+  int64_t last_color_us_ = 0;  // when the last color came, or the map did
   Publisher<OccupancyRequest> requests_;
   int64_t num_asked_ = 0;
   std::optional<OccupancyUpdate> occupancy_;  // the whole

@@ -93,9 +93,11 @@ void OccupancyStage::Publish() {
                          .resolution = occupancy->options().resolution,
                          .is_whole = is_whole_wanted_,
                          .num_keyframes = static_cast<int64_t>(occupancy->scans().size()),
-                         .blocks = occupancy->TakeChangedBlocks()};
+                         .blocks = occupancy->TakeChangedBlocks(),
+                         .colors = {}};
   if (is_whole_wanted_) update.blocks = occupancy->Blocks();
   if (update.blocks.empty() && !is_whole_wanted_) return;
+  update.colors = occupancy->ColorsOf(update.blocks);
   is_whole_wanted_ = false;
   updates_.Publish(update);
   ++num_published_;

@@ -28,11 +28,20 @@ def height_colors(positions: np.ndarray, bounds: tuple[float, float] | None = No
     return np.stack([np.interp(share, steps, column) for column in HEIGHT_COLORS.T], axis=1).astype(np.uint8)
 
 
-def seen_colors(colors: np.ndarray) -> np.ndarray:
-    """N x 3 bytes of n x 3: what occurs spread over all that a screen shows, dark made lighter."""
+def seen_bounds(colors: np.ndarray) -> tuple[float, float]:
+    """Darkest and brightest of n x 3 (0..255), without the few beyond."""
+    low, high = np.quantile(colors.mean(axis=1), [DARK, BRIGHT])
+    return float(low), float(high)
+
+
+def seen_colors(colors: np.ndarray, bounds: tuple[float, float] | None = None) -> np.ndarray:
+    """N x 3 bytes of n x 3: what occurs spread over all that a screen shows, dark made lighter.
+
+    `bounds`: the brightnesses that are spread; those of these colors where none are given.
+    """
     if not len(colors):
         return np.empty((0, 3), np.uint8)
-    low, high = np.quantile(colors.mean(axis=1), [DARK, BRIGHT])
+    low, high = bounds or seen_bounds(colors)
     share = np.clip((colors - low) / max(high - low, 1.0), 0, 1) ** GAMMA
     return (DARKEST + (255 - DARKEST) * share).astype(np.uint8)
 

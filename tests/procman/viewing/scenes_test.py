@@ -221,8 +221,13 @@ def test_the_newest_image_is_shown_with_its_keypoints_once() -> None:
     assert list(bus.pictures()) == []
 
 
-def make_occupancy(number: int, occupied: dict[tuple[int, int, int], list[int]], is_whole: bool = False) -> Any:
-    """Of each block, the numbers of the voxels that are occupied; the others are free."""
+def make_occupancy(
+    number: int,
+    occupied: dict[tuple[int, int, int], list[int]],
+    is_whole: bool = False,
+    colors: list[tuple[int, int, int]] | None = None,
+) -> Any:
+    """Of each block, the numbers of the voxels that are occupied, in ascending order; the others are free."""
     message = set_header(tessera.occupancy_t())
     message.number, message.resolution, message.is_whole = number, 0.5, is_whole
     for (x, y, z), voxels in occupied.items():
@@ -233,6 +238,11 @@ def make_occupancy(number: int, occupied: dict[tuple[int, int, int], list[int]],
         block.x, block.y, block.z, block.states = x, y, z, packed.astype(np.uint8).tobytes()
         message.blocks.append(block)
     message.num_blocks = len(message.blocks)
+    for red, green, blue in colors or []:
+        color = tessera.rgb_t()
+        color.red, color.green, color.blue = red, green, blue
+        message.colors.append(color)
+    message.num_colors = len(message.colors)
     return received(message)
 
 
@@ -277,6 +287,44 @@ def test_colors_are_chosen_anew_when_heights_grow() -> None:
     assert len(shown) == 2, "also the region that did not change"
     low, high = shown[f"{scene.VOXELS}/0_0_0"].colors[0], shown[f"{scene.VOXELS}/0_-10_0"].colors[0]
     assert low.tolist() == HEIGHT_COLORS[0].tolist() and high.tolist() == [250, 220, 120]
+
+
+RED, BLACK, WHITE = (255, 0, 0), (0, 0, 0), (255, 255, 255)
+
+
+def colors_at(shapes: Any) -> dict[tuple[float, ...], list[int]]:
+    """By the centers of voxels."""
+    return {
+        tuple(center): color for shape in shapes for center, color in zip(shape.centers.tolist(), shape.colors.tolist())
+    }
+
+
+def test_occupied_voxels_have_the_colors_that_are_told_of_them() -> None:
+    occupancy = LiveOccupancy()
+    blocks: dict[tuple[int, int, int], list[int]] = {(0, 0, 0): [0, 1], (1, 0, 0): [], (9, 0, 0): [3]}
+    occupancy.on_update(make_occupancy(0, blocks, is_whole=True, colors=[RED, BLACK, WHITE]))
+    shown = colors_at(occupancy.shapes())
+    red, black, white = shown[0.25, 0.25, 0.25], shown[0.75, 0.25, 0.25], shown[0.5 * (9 * 16 + 3.5), 0.25, 0.25]
+    assert black == [DARKEST] * 3 and white == [255] * 3 and red[0] > red[1] == red[2]
+    occupancy.on_update(make_occupancy(1, {(0, 0, 0): [1, 2]}, colors=[WHITE, BLACK]))
+    shown = colors_at(occupancy.shapes())
+    assert shown[0.75, 0.25, 0.25] == [255] * 3 and shown[1.25, 0.25, 0.25] == [DARKEST] * 3
+
+
+def test_what_was_told_before_there_were_colors_turns_from_its_height_to_gray() -> None:
+    occupancy = LiveOccupancy()
+    occupancy.on_update(make_occupancy(0, {(0, 0, 0): [0]}, is_whole=True))
+    assert colors_at(occupancy.shapes())[0.25, 0.25, 0.25] in HEIGHT_COLORS.tolist()
+    occupancy.on_update(make_occupancy(1, {(9, 0, 0): [0, 1]}, colors=[BLACK, WHITE]))
+    shown = colors_at(occupancy.shapes())
+    red, green, blue = shown[0.25, 0.25, 0.25]
+    assert len(shown) == 3 and DARKEST < red == green == blue < 255
+
+
+def test_as_many_colors_as_voxels_or_none_count() -> None:
+    occupancy = LiveOccupancy()
+    occupancy.on_update(make_occupancy(0, {(0, 0, 0): [0, 1]}, is_whole=True, colors=[RED]))
+    assert colors_at(occupancy.shapes())[0.25, 0.25, 0.25] in HEIGHT_COLORS.tolist()
 
 
 def test_colors_spread_over_what_a_screen_shows() -> None:
