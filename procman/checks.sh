@@ -25,10 +25,10 @@ run_tests() {
   tell_failures
 }
 
-# Two at a time: they wait for processes most of the time. helpers/stack.py gives each its ports.
+# Three at a time: they wait for processes most of the time. helpers/stack.py gives each its ports.
 run_pytest() (
   cd "$root"
-  PYTHONPATH="$root/procman" .venv/bin/python -P -m pytest -p no:cacheprovider -n 2 --dist loadfile -rs tests
+  PYTHONPATH="$root/procman" .venv/bin/python -P -m pytest -p no:cacheprovider -n 3 --dist loadfile -rs tests
 )
 
 NOT_SANITIZED='^(simulation|stages)$'
@@ -43,7 +43,7 @@ sanitized_tests() {
 run_sanitized() {
   local folder="build-sanitize-${1//,/-}"
   prepare ask
-  configure "$folder" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DTESSERA_SANITIZE="$1" \
+  configure "$folder" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og -g1" -DTESSERA_SANITIZE="$1" \
     -DTESSERA_DATA="$root/$folder/no-data"
   # shellcheck disable=SC2046 # one word for each
   build_in "$folder" $(sanitized_tests) tessera_fuzz_targets

@@ -19,9 +19,9 @@ PORTS_PER_RUN = 40
 
 
 def _suite() -> int:
-    """Another number for each test suite on this machine, and for both of its workers (pytest-xdist)."""
+    """Another number for each test suite on this machine, and for each of its three workers (pytest-xdist)."""
     worker = os.environ.get("PYTEST_XDIST_WORKER")
-    return 2 * os.getppid() + int(worker.removeprefix("gw")) if worker else 2 * os.getpid()
+    return 3 * os.getppid() + int(worker.removeprefix("gw")) if worker else 3 * os.getpid()
 
 
 # Two test suites on one machine use different ports, above those that a run takes by itself and below 32768: from
