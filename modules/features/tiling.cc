@@ -83,20 +83,23 @@ Image<Pixel> Take(Image<Pixel>& image, const Rect& rect, bool is_only_job) {
   const bool is_whole = rect == Rect{.x = 0, .y = 0, .width = image.width, .height = image.height};
   return is_only_job && is_whole ? std::move(image) : Crop(image, rect);
 }
+// Likewise of a level of the image.
+GrayImage TakeLevel(GrayImage& image, int level, const Rect& rect, bool is_only_job) {
+  return level == 0 ? Take(image, rect, is_only_job) : Crop(ReduceToLevel(image, level), rect);
+}
 
-// Rectangles and pixels of the job, for the core and the levels that it has; `left` and `right` are at its first level.
-void TakePixels(GrayImage& left, GrayImage& right, DepthImage& depth, TileJob& job, const TilePlan& plan,
-                bool is_only_job) {
+// Rectangles and pixels of the job, for the core and the levels that it has.
+void TakePixels(CameraFrame& frame, TileJob& job, const TilePlan& plan, bool is_only_job) {
   const LevelPlan& needed = plan.levels[static_cast<size_t>(job.first_level)];
   job.left_rect = needed.left;
-  job.left = Take(left, job.left_rect, is_only_job);
+  job.left = TakeLevel(frame.left, job.first_level, job.left_rect, is_only_job);
   if (job.calibration.sensor == SensorType::kStereo) {
     job.right_rect = needed.right;
-    job.right = Take(right, job.right_rect, is_only_job);
+    job.right = TakeLevel(frame.right, job.first_level, job.right_rect, is_only_job);
   }
   if (job.calibration.sensor == SensorType::kRgbd) {
     job.depth_rect = plan.depth;
-    job.depth = Take(depth, job.depth_rect, is_only_job);
+    job.depth = Take(frame.depth, job.depth_rect, is_only_job);
   }
 }
 
@@ -113,29 +116,6 @@ void CheckFrame(const CameraFrame& frame, const CameraCalibration& calibration, 
     throw InputError(where + "its images are not all " + std::to_string(calibration.width_px) + "x" +
                      std::to_string(calibration.height_px) + " px as the calibration says");
   }
-}
-
-// The parts of the image that the tiles answer for, line by line.
-std::vector<Rect> CoresOf(TileGrid grid, const CameraCalibration& calibration) {
-  std::vector<Rect> cores;
-  for (int line = 0; line < grid.lines; ++line) {
-    for (int column = 0; column < grid.columns; ++column) {
-      const int x = calibration.width_px * column / grid.columns;
-      const int y = calibration.height_px * line / grid.lines;
-      cores.push_back({.x = x,
-                       .y = y,
-                       .width = calibration.width_px * (column + 1) / grid.columns - x,
-                       .height = calibration.height_px * (line + 1) / grid.lines - y});
-    }
-  }
-  return cores;
-}
-
-// What CutFrame says of coarse levels.
-TileGrid GridOfCoarseLevels(TileGrid grid) {
-  constexpr int kMaxTiles = 8;
-  if (grid.lines * grid.columns > kMaxTiles) return {};
-  return {.lines = std::min(grid.lines, 2), .columns = std::min(grid.columns, 2)};
 }
 
 }  // namespace
@@ -162,33 +142,37 @@ std::vector<TileJob> CutFrame(CameraFrame frame, const CameraCalibration& calibr
   CheckFrame(frame, calibration, options);
   const bool is_cut = grid.lines * grid.columns > 1;
   std::vector<TileJob> jobs;
-  const auto add = [&](TileGrid tiles, int first_level, int last_level, bool even_if_idle) {
+  const auto add = [&](const Rect& core, int first_level, int last_level, bool even_if_idle) {
     if (first_level > last_level) return;
-    CameraFrame reduced;
-    if (first_level > 0) reduced.left = ReduceToLevel(frame.left, first_level);
-    if (first_level > 0 && !frame.right.empty()) reduced.right = ReduceToLevel(frame.right, first_level);
-    CameraFrame& images = first_level > 0 ? reduced : frame;
-    for (const Rect& core : CoresOf(tiles, calibration)) {
-      const TilePlan plan = PlanTile(calibration, options, core, first_level, last_level);
-      if (!plan.HasCells() && !even_if_idle) continue;
-      TileJob& job = jobs.emplace_back();
-      job.frame = frame.id;
-      job.utime_us = frame.utime_us;
-      job.captured_us = captured_us;
-      job.calibration = calibration;
-      job.options = options;
-      job.first_level = first_level;
-      job.last_level = last_level;
-      job.core = core;
-      TakePixels(images.left, images.right, frame.depth, job, plan, !is_cut);
-    }
+    const TilePlan plan = PlanTile(calibration, options, core, first_level, last_level);
+    if (!plan.HasCells() && !even_if_idle) return;
+    TileJob& job = jobs.emplace_back();
+    job.frame = frame.id;
+    job.utime_us = frame.utime_us;
+    job.captured_us = captured_us;
+    job.calibration = calibration;
+    job.options = options;
+    job.first_level = first_level;
+    job.last_level = last_level;
+    job.core = core;
+    TakePixels(frame, job, plan, !is_cut);
   };
 
-  const int last_level = options.num_levels - 1;
+  const Rect whole{.x = 0, .y = 0, .width = calibration.width_px, .height = calibration.height_px};
   const int first_coarse_level = is_cut ? std::clamp(coarse_levels_from, 0, options.num_levels) : 0;
-  add(is_cut ? GridOfCoarseLevels(grid) : grid, first_coarse_level, last_level, false);
-  add(grid, 0, first_coarse_level - 1, false);
-  if (jobs.empty()) add({}, 0, last_level, true);  // every frame has an answer
+  add(whole, first_coarse_level, options.num_levels - 1, false);
+  for (int line = 0; is_cut && line < grid.lines; ++line) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const int x = whole.width * column / grid.columns;
+      const int y = whole.height * line / grid.lines;
+      const Rect core{.x = x,
+                      .y = y,
+                      .width = whole.width * (column + 1) / grid.columns - x,
+                      .height = whole.height * (line + 1) / grid.lines - y};
+      add(core, 0, first_coarse_level - 1, false);
+    }
+  }
+  if (jobs.empty()) add(whole, 0, options.num_levels - 1, true);  // every frame has an answer
   std::ranges::stable_sort(jobs, std::greater(), WorkOf);
   for (size_t tile = 0; tile < jobs.size(); ++tile) {
     jobs[tile].tile = static_cast<int32_t>(tile);

@@ -25,11 +25,10 @@ TileGrid ParseTileGrid(const std::string& text);
 // The jobs of one frame, num_tiles of them, in the order in which they are best given out: the most work first, so that
 // none is left to run alone at the end.
 //
-// A 1x1 grid makes one job with all levels of the pyramid. Otherwise the coarse levels, from `coarse_levels_from` up,
-// are jobs of their own (their margins would be wide in level-0 pixels), which bring the image at the first of these
-// levels: level 4 has a quarter of the pixels. They are cut in two along each side that the grid cuts, so that as many
-// extractors as tiles get an equal share; with more than 8 tiles one job has them all, which takes as long as two of
-// those tiles then. Each tile of the grid has the levels below. Tiles that have nothing to detect are left out.
+// A 1x1 grid makes one job with all levels of the pyramid. Otherwise one job has the coarse levels
+// from `coarse_levels_from` up, of the whole image (their margins would be wide in level-0 pixels), which it brings at
+// the first of these levels: level 4 has a quarter of the pixels; then each tile of the grid, line by line, has the
+// levels below that. Tiles that have nothing to detect are left out.
 //
 // captured_us is copied into the jobs. Throws InputError if the options, the calibration or the sizes of the images are
 // wrong.

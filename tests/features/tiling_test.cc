@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -78,27 +77,6 @@ TEST(CutFrame, BringsCoarseLevelsReducedAndTheMostWorkFirst) {
     EXPECT_LE(4 * jobs[i].left.pixels.size(), frame.left.pixels.size());
   }
   EXPECT_EQ(num_coarse, 1);
-}
-
-TEST(CutFrame, GivesAsManyExtractorsAsTilesAnEqualShare) {
-  const CameraFrame frame = MakeFrame(SensorType::kMono, MakeTexture(1241, 376, 1));
-  const CameraCalibration calibration = MakeCalibration(SensorType::kMono, 1241, 376);
-  const auto work_of_all = [&](TileGrid grid) {
-    std::vector<int64_t> work;
-    for (const TileJob& job : CutFrame(frame, calibration, 0, grid, 4, {})) work.push_back(WorkOf(job));
-    return work;
-  };
-  const int64_t whole = work_of_all({}).front();
-  for (const TileGrid grid : {TileGrid{2, 1}, {2, 2}, {2, 4}}) {
-    const int num_tiles = grid.lines * grid.columns;
-    const std::vector<int64_t> work = work_of_all(grid);
-    EXPECT_EQ(work.size(), static_cast<size_t>(num_tiles + std::min(grid.lines, 2) * std::min(grid.columns, 2)));
-    // One job after the other to the extractor that has the least to do.
-    std::vector<int64_t> shares(static_cast<size_t>(num_tiles));
-    for (const int64_t job : work) *std::ranges::min_element(shares) += job;
-    const double longest = static_cast<double>(*std::ranges::max_element(shares)) / static_cast<double>(whole);
-    EXPECT_LT(longest, 1.0 / num_tiles + 0.145) << num_tiles;
-  }
 }
 
 TEST(WorkOf, GrowsWithPixelsAndLevels) {
