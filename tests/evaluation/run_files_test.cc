@@ -134,7 +134,9 @@ TEST_F(RunFilesTest, LandmarksHaveColorsInTheMapsFileWhereTheyAreKnown) {
   RunRecord record = SmallRun();
   WriteRun(record, folder_);
   EXPECT_EQ(Read("map.ply").find("red"), std::string::npos);
-  record.AddColor({.id = {1}, .image = ColorImage(2, 2, {.red = 'r', .green = 'g', .blue = 'b'})});
+  record.AddColor({.id = {1},
+                   .utime_us = 1'403'636'584'763'556,
+                   .image = ColorImage(2, 2, {.red = 'r', .green = 'g', .blue = 'b'})});
   WriteRun(record, folder_);
   const std::string ply = Read("map.ply");
   EXPECT_NE(ply.find("property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"), std::string::npos);
