@@ -221,7 +221,9 @@ CameraSession StartedAgain(SourceOpener open_again) {
   for (int64_t frame = 0; frame < 9; ++frame) {
     EXPECT_THAT(session.MarkTracked({frame}, frame * kFrameUs, 0), IsSuccess());
     const bool is_keyframe = frame % 3 == 2;
-    if (is_keyframe) EXPECT_TRUE(session.TellColor({frame}, frame * kFrameUs).empty()) << "it is read later";
+    if (is_keyframe) {
+      EXPECT_TRUE(session.TellColor({frame}, frame * kFrameUs).empty()) << "it is read later";
+    }
   }
   return session;
 }
@@ -260,7 +262,9 @@ TEST(CameraSession, OfManyKeyframesBeforeTheNewestAreReadAgain) {
     ASSERT_THAT(session.MarkTracked({frame}, frame * kFrameUs, 0), IsSuccess());
     const std::vector<ColorFrame> dropped = AllOf<ColorFrame>(session.TellColor({frame}, frame * kFrameUs));
     ASSERT_EQ(dropped.size(), frame < 2 * kMax ? 0U : 1U);
-    if (!dropped.empty()) EXPECT_EQ(dropped[0].id.value, frame - 2 * kMax);
+    if (!dropped.empty()) {
+      EXPECT_EQ(dropped[0].id.value, frame - 2 * kMax);
+    }
   }
   EXPECT_EQ(AllOf<ColorFrame>(session.TellMissedColor()).at(0).id, FrameId{4});
 }
