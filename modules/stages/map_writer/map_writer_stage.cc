@@ -49,9 +49,9 @@ MapWriterStage::MapWriterStage(StageContext& context)
       map_(
           context, true, [this](const MapFollower::Delta& delta) { return Apply(*delta); }, [this] { WriteIfDone(); }) {
   map_.FollowToEnd();
+  context.Every(kLookAgain, [this] { WriteIfDone(); });
   if (kind_ == Kind::kLandmarks) {
     context.Subscribe(kColor, [this](const ColorFrame& color) { Receive(color); });
-    context.Every(kLookAgain, [this] { WriteIfDone(); });
     return;
   }
   if (follows_) {
@@ -114,7 +114,8 @@ bool MapWriterStage::HasColors() const {
 void MapWriterStage::WriteIfDone() {
   const bool is_there = replica_.next_delta() > 0 && !map_.needs_snapshot();
   if (context_.finished() || !is_there || (follows_ && !map_.is_complete())) return;
-  if (kind_ == Kind::kLandmarks ? !HasCaughtUp() || !HasColors() : !occupancy_) return;
+  if (!HasCaughtUp()) return;
+  if (kind_ == Kind::kLandmarks ? !HasColors() : !occupancy_) return;
   try {
     Write();
   } catch (const InputError& error) {
