@@ -1,6 +1,5 @@
 """The message types that the build generates from lcmtypes/, and how their bytes are decoded."""
 
-import importlib
 import io
 import struct
 import sys
@@ -12,78 +11,36 @@ from tessera_cli.text import visible, visible_lines
 
 sys.path.insert(0, str(BUILD / "lcmtypes" / "python"))
 
-import tessera as message_types
-from tessera import (
-    calibration_t,
-    camera_image_t,
-    color_image_t,
-    end_of_stream_t,
-    features_t,
-    ground_truth_t,
-    header_t,
-    heartbeat_t,
-    map_delta_t,
-    map_file_t,
-    map_request_t,
-    map_snapshot_t,
-    occupancy_request_t,
-    occupancy_t,
-    pose_t,
-    procman_list_t,
-    procman_order_t,
-    procman_output_t,
-    procman_process_t,
-    procman_status_t,
-    procman_wish_t,
-    repair_request_t,
-    stage_status_t,
-)
+import tessera
 
-__all__ = [
-    "calibration_t",
-    "camera_image_t",
-    "color_image_t",
-    "decode",
-    "end_of_stream_t",
-    "features_t",
-    "ground_truth_t",
-    "header_t",
-    "heartbeat_t",
-    "map_delta_t",
-    "map_file_t",
-    "map_request_t",
-    "map_snapshot_t",
-    "message_types",
-    "occupancy_request_t",
-    "occupancy_t",
-    "pose_t",
-    "procman_list_t",
-    "procman_order_t",
-    "procman_output_t",
-    "procman_process_t",
-    "procman_status_t",
-    "procman_wish_t",
-    "receive",
-    "receive_as",
-    "repair_request_t",
-    "stage_status_t",
-    "type_of",
-]
+message_types: Any = tessera
+
+
+def __getattr__(name: str) -> Any:
+    """A message type of the build: `from tessera_cli.messages import pose_t`.
+
+    Raises AttributeError, which is ImportError there, if the build, perhaps of an older commit, has none of this name.
+    """
+    if name.endswith("_t"):
+        return getattr(message_types, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 # Every message begins with what tells its type.
 FINGERPRINT_BYTES, MAX_HEADER_BYTES = 8, 1000
 
 # What no member of a run has signed. (Arrays of bytes that LCM generates are empty at first: none can be encoded.)
 UNSIGNED = bytes(16)
-_make_header = header_t.__init__
+_make_header = message_types.header_t.__init__
 
 
-def _make_unsigned_header(header: header_t) -> None:
+def _make_unsigned_header(header: Any) -> None:
     _make_header(header)
-    header.tag = UNSIGNED
+    if "tag" in header.__slots__:  # not in builds of old commits
+        header.tag = UNSIGNED
 
 
-header_t.__init__ = _make_unsigned_header
+message_types.header_t.__init__ = _make_unsigned_header
 
 # What generated code raises on bytes that are no such message.
 _DECODE_ERRORS = (ValueError, struct.error, MemoryError, IndexError, OverflowError, TypeError)
@@ -107,7 +64,7 @@ def receive(message_type: Any, data: bytes) -> Any | None:
 
 def receive_as(type_name: str, data: bytes) -> Any | None:
     """As `receive`, of the type of this name; None also if the build, of another commit, has no such type."""
-    message_type = getattr(importlib.import_module("tessera"), type_name, None)
+    message_type = getattr(message_types, type_name, None)
     return receive(message_type, data) if message_type else None
 
 
@@ -129,13 +86,15 @@ def receive_logged(data: bytes) -> Any | None:
     return receive(message_type, data) if message_type else None
 
 
-def header_of(data: bytes) -> header_t | None:
+def header_of(data: bytes) -> Any | None:
     """The header of a message of ours, without the rest, which may be an image; None: it has none."""
     message_type = _types_by_fingerprint().get(data[:FINGERPRINT_BYTES])
     if message_type is None or message_type.__slots__[0] != "header":
         return None
     try:
-        header = header_t._decode_one(io.BytesIO(data[FINGERPRINT_BYTES : FINGERPRINT_BYTES + MAX_HEADER_BYTES]))
+        header = message_types.header_t._decode_one(
+            io.BytesIO(data[FINGERPRINT_BYTES : FINGERPRINT_BYTES + MAX_HEADER_BYTES])
+        )
     except _DECODE_ERRORS:
         return None
     _make_visible(header)
@@ -147,7 +106,7 @@ def _make_visible(message: Any) -> None:
     for name in message.__slots__:
         value = getattr(message, name)
         if isinstance(value, str):
-            has_lines = isinstance(message, procman_output_t) and name == "text"
+            has_lines = isinstance(message, message_types.procman_output_t) and name == "text"
             setattr(message, name, visible_lines(value) if has_lines else visible(value))
         elif isinstance(value, list) and value and isinstance(value[0], str):
             setattr(message, name, [visible(text) for text in value])

@@ -85,10 +85,10 @@ def _describe(arguments: Namespace, sequences: list[Sequence], sides: dict[str, 
 def _carry_out(
     runner: ExperimentRunner, sequences: list[Sequence], runs: list[PlannedRun], sides: list[str], with_timeline: bool
 ) -> None:
-    sources = {sequence.key: runner.render(sequence) for sequence in sequences}
+    sources = {(sequence.key, side): runner.render(sequence, side) for sequence in sequences for side in sides}
     for sequence in sequences if with_timeline else []:
         for side in sides:
-            runner.record_events(sequence, side, sources[sequence.key])
+            runner.record_events(sequence, side, sources[sequence.key, side])
     runner.measure_all(runs, sources)
 
 

@@ -51,15 +51,15 @@ class ExperimentRunner:
         self._options, self._view = options, view
         self._here = next(iter(sides.values()))
 
-    def render(self, sequence: Sequence) -> str:
+    def render(self, sequence: Sequence, side: str) -> str:
         """The source to run."""
-        return render(sequence, self._options.frames[1], self._here, self._commands, self._view)
+        return render(sequence, self._options.frames[1], self._sides[side], self._commands, self._view)
 
-    def measure_all(self, runs: list[PlannedRun], sources: Mapping[str, str]) -> None:
-        """`sources`: by key of the sequence. Raises RunError if a run fails."""
+    def measure_all(self, runs: list[PlannedRun], sources: Mapping[tuple[str, str], str]) -> None:
+        """`sources`: by key of the sequence and side. Raises RunError if a run fails."""
 
         def carry_out(run: PlannedRun) -> float:
-            path, source = self._folder.run_path(run), sources[run.sequence.key]
+            path, source = self._folder.run_path(run), sources[run.sequence.key, run.side]
             return self._run(self._sides[run.side], run.name, path, self._options.words(run.sequence, source, path))
 
         measure_all(self._folder, runs, carry_out, self._view)
