@@ -45,8 +45,8 @@ class MapEditor {
 
   // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
   const IdSet<LandmarkId>& touched_landmarks() const { return touched_; }
-  // Whether an observation of the landmark came or went.
-  bool IsReobserved(LandmarkId id) const { return reobserved_.Has(id); }
+  // Landmarks of which an observation came or went, also such as no longer exist.
+  const IdSet<LandmarkId>& reobserved_landmarks() const { return reobserved_; }
 
   // The delta of all edits. The editor must not be used after it.
   MapDelta Finish(KeyframeId answers);

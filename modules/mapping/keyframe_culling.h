@@ -7,6 +7,9 @@
 // the map in turn: by taking turns, visits would wear the map out.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "core/result.h"
 #include "map/map_editor.h"
 #include "map/removed_keyframes.h"
@@ -24,10 +27,54 @@ struct KeyframeCullingOptions {
   Result<> Check() const;
 };
 
-// Removes the redundant keyframes among those that share landmarks with `center`. Their children pass to their parents,
-// and `removed` remembers where they were. Roots of the spanning tree stay, and so do keyframes that closed a loop.
-// Cameras count their frames from the start of a run: where the numbers fall back, another visit begins.
-void CullKeyframes(KeyframeId center, const KeyframeCullingOptions& options, RemovedKeyframes& removed,
-                   MapEditor& editor);
+// Which visit of the map made a keyframe, counted from 0. Cameras count their frames from the start of a run: where the
+// numbers fall back, another visit begins.
+class Visits {
+ public:
+  // Looks at all keyframes of the map the first time, then only at `newest`.
+  void Update(const Map& map, KeyframeId newest);
+  int Of(KeyframeId id) const;
+  int newest() const { return static_cast<int>(begins_.size()); }
+
+ private:
+  void Add(KeyframeId id, const Keyframe& keyframe);
+
+  std::vector<KeyframeId> begins_;  // of the second and later ones
+  KeyframeId last_;
+  FrameId last_frame_;
+};
+
+// By landmark: the n-th finest pyramid level at which a keyframe observes it. On a long straight road a keyframe shares
+// far points with hundreds of others, which all look at their landmarks at each step: asked of the map, half of the
+// mapper's time after 4 km.
+class ObserverLevels {
+ public:
+  explicit ObserverLevels(int n) : n_(n) {}
+  // Higher than any level if there are fewer observers.
+  int Of(const Map& map, LandmarkId id);
+  void Forget(LandmarkId id);
+
+ private:
+  int n_;
+  std::vector<uint8_t> levels_;  // by landmark id
+};
+
+class KeyframeCuller {
+ public:
+  explicit KeyframeCuller(const KeyframeCullingOptions& options);
+
+  // Removes the redundant keyframes among those that share landmarks with `center`, the newest one. Their children pass
+  // to their parents, and `removed` remembers where they were. Roots of the spanning tree stay, and so do keyframes that
+  // closed a loop. Every other change of the map must go through the editor of some call.
+  void Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
+
+ private:
+  bool IsRedundant(const Map& map, KeyframeId id);
+  void Remove(KeyframeId id, RemovedKeyframes& removed, MapEditor& editor);
+
+  KeyframeCullingOptions options_;
+  Visits visits_;
+  ObserverLevels levels_;
+};
 
 }  // namespace tessera

@@ -44,7 +44,7 @@ void RefreshDescriptions(MapEditor& editor) {
       editor.RemoveLandmark(id);
     } else {
       editor.ChangeLandmark(
-          id, editor.IsReobserved(id) ? DescribeLandmark(editor.map(), id) : DescribeMovedLandmark(editor.map(), id));
+          id, editor.reobserved_landmarks().Has(id) ? DescribeLandmark(editor.map(), id) : DescribeMovedLandmark(editor.map(), id));
     }
   }
 }
@@ -62,7 +62,7 @@ Result<> MapperOptions::Check() const {
   return keyframe_culling.Check();
 }
 
-Mapper::Mapper(const MapperOptions& options) : options_(options) {
+Mapper::Mapper(const MapperOptions& options) : options_(options), keyframe_culler_(options.keyframe_culling) {
   ThrowIfFailed<std::invalid_argument>(options.Check());
 }
 
@@ -79,7 +79,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   FuseLandmarks(seen.id, options_.fusion, editor);
   if (IsCautious(seen.id)) RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
   AdjustLocally(seen.id, Window(seen.id), options_.bundle, motions_, editor);
-  CullKeyframes(seen.id, options_.keyframe_culling, removed_, editor);
+  keyframe_culler_.Cull(seen.id, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
   for (const KeyframeId id : delta.removed_keyframes) motions_.erase(id);

@@ -86,6 +86,7 @@ class Mapper {
   KeyframeId cautious_until_;  // the last keyframe to be mapped with caution, if no other asks for it
   RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;
+  KeyframeCuller keyframe_culler_;
   KeyframeId last_corrected_;           // the delta that answers it corrected the map
   bool wants_adjustment_ = false;       // a loop was closed after the last adjustment was requested
   std::optional<AdjustmentBase> base_;  // of the adjustment under way

@@ -25,7 +25,7 @@ class KeyframeCulling : public testing::Test {
   }
   void Cull(const KeyframeCullingOptions& options = {}) {
     MapEditor editor(planted_.map());
-    CullKeyframes({kNum - 1}, options, removed_, editor);
+    KeyframeCuller(options).Cull({kNum - 1}, removed_, editor);
     (void)editor.Finish({kNum - 1});
   }
   std::vector<int64_t> Left() const {
@@ -58,6 +58,26 @@ TEST_F(KeyframeCulling, RedundantKeyframesGoButForTheRootAndTheNewest) {
   Plant();
   Cull({.kept_newest = 3});
   EXPECT_EQ(Left(), (std::vector<int64_t>{0, 7, 8, 9}));
+}
+
+// It remembers from call to call who observes what.
+TEST_F(KeyframeCulling, ChangesSinceTheLastCallCount) {
+  Plant();
+  KeyframeCuller culler({});
+  std::vector<std::pair<LandmarkId, Observation>> forgotten;
+  ForEachObservation([&](LandmarkId landmark, const Observation& seen) {
+    if (seen.keyframe.value >= 3) forgotten.emplace_back(landmark, seen);
+  });
+  MapEditor forgets(planted_.map());
+  for (const auto& [landmark, seen] : forgotten) forgets.RemoveObservation(landmark, seen);
+  culler.Cull({2}, removed_, forgets);
+  (void)forgets.Finish({kNum - 1});
+  EXPECT_EQ(Left().size(), 10U) << "three observers are not enough";
+  MapEditor remembers(planted_.map());
+  for (const auto& [landmark, seen] : forgotten) remembers.AddObservation(landmark, seen);
+  culler.Cull({kNum - 1}, removed_, remembers);
+  (void)remembers.Finish({kNum - 1});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 7, 8, 9})) << "as if it had not looked before";
 }
 
 TEST_F(KeyframeCulling, ALandmarkNeedsSeveralOtherObservers) {
