@@ -29,6 +29,7 @@ Eigen::Matrix3d PositionInformation(const Keyframe& keyframe, int32_t keypoint, 
 Eigen::Matrix3d ParallelSum(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   constexpr double kRegular = 1e-12;
   Eigen::Matrix3d sum = a + b;
+  if (!(sum.trace() > 0.0)) return Eigen::Matrix3d::Zero();  // a point behind all of its observers tells nothing
   sum.diagonal().array() += kRegular * sum.trace();
   const Eigen::Matrix3d parallel = a * sum.inverse() * b;
   return 0.5 * (parallel + parallel.transpose());
@@ -44,10 +45,18 @@ Matrix7 SeenFrom(const Keyframe& newer, const Eigen::Vector3d& position, const E
   return in_world.transpose() * information * in_world;
 }
 
-using LinkIndex = std::map<std::pair<KeyframeId, KeyframeId>, size_t>;  // by older and newer keyframe
+// By newer keyframe: the older ones that it is linked to, and the number of that link.
+using LinksOf = std::map<KeyframeId, std::vector<std::pair<KeyframeId, size_t>>>;
+
+LinksOf IndexLinks(std::span<const KeyframePair> links) {
+  LinksOf links_of;
+  for (size_t i = 0; i < links.size(); ++i) links_of[links[i].newer].emplace_back(links[i].older, i);
+  for (auto& [newer, older] : links_of) std::ranges::sort(older);
+  return links_of;
+}
 
 // Adds what the landmark contributes to every link between two of its observers.
-void AddLandmark(const Map& map, LandmarkId id, const LinkIndex& index_of, std::vector<Matrix7>& information) {
+void AddLandmark(const Map& map, LandmarkId id, const LinksOf& links_of, std::vector<Matrix7>& information) {
   const Eigen::Vector3d& position = map.FindLandmark(id)->position_in_world;
   const std::span<const Observation> seen = map.ObservationsOf(id);
   std::vector<Eigen::Matrix3d> up_to(seen.size()), from;
@@ -58,20 +67,23 @@ void AddLandmark(const Map& map, LandmarkId id, const LinkIndex& index_of, std::
   for (size_t i = 1; i < seen.size(); ++i) up_to[i] += up_to[i - 1];
   for (size_t i = seen.size(); i-- > 1;) from[i - 1] += from[i];
   for (size_t newer = 1; newer < seen.size(); ++newer) {
-    for (size_t older = 0; older < newer; ++older) {
-      const auto link = index_of.find({seen[older].keyframe, seen[newer].keyframe});
-      if (link == index_of.end()) continue;
-      information[link->second] +=
-          SeenFrom(*map.FindKeyframe(seen[newer].keyframe), position, ParallelSum(up_to[older], from[newer]));
+    const auto links = links_of.find(seen[newer].keyframe);
+    if (links == links_of.end()) continue;
+    const Keyframe& keyframe = *map.FindKeyframe(seen[newer].keyframe);
+    size_t older = 0;
+    for (const auto& [keyframe_before, link] : links->second) {  // both lists are by id
+      while (older < newer && seen[older].keyframe < keyframe_before) ++older;
+      if (older == newer) break;
+      if (seen[older].keyframe != keyframe_before) continue;
+      information[link] += SeenFrom(keyframe, position, ParallelSum(up_to[older], from[newer]));
     }
   }
 }
 
 std::vector<Matrix7> LinkInformation(const Map& map, std::span<const KeyframePair> links) {
   std::vector<Matrix7> information(links.size(), Matrix7::Zero());
-  LinkIndex index_of;
-  for (size_t i = 0; i < links.size(); ++i) index_of[{links[i].older, links[i].newer}] = i;
-  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) { AddLandmark(map, id, index_of, information); });
+  const LinksOf links_of = IndexLinks(links);
+  map.landmarks().ForEach([&](LandmarkId id, const Landmark&) { AddLandmark(map, id, links_of, information); });
   return information;
 }
 
@@ -98,12 +110,12 @@ struct Step {
   double log_depth = 0.0;  // median, at its end
 };
 
-std::vector<Step> StepsOf(const Map& map, std::span<const KeyframeId> part) {
+std::vector<Step> StepsOf(const Map& map, std::span<const KeyframeId> part, const MedianDepths& depths) {
   constexpr double kLeastShare = 1e-3;  // of the depth, a second: slower is standing still
   std::vector<Step> steps(part.size());
   for (size_t i = 0; i < part.size(); ++i) {
     const Keyframe& keyframe = *map.FindKeyframe(part[i]);
-    const double depth = MedianDepth(map, keyframe);
+    const double depth = depths.at(part[i]);
     steps[i].end_s = 1e-6 * static_cast<double>(keyframe.features->utime_us);
     steps[i].log_depth = std::log(depth);
     steps[i].log_speed = std::log(kLeastShare * depth);
@@ -133,8 +145,9 @@ double CommonChange(const std::vector<Step>& steps, size_t i) {
 }
 
 // By keyframe of the part: the variance of the log scale by slips from the first one to it.
-std::map<KeyframeId, double> SlipVariances(const Map& map, std::span<const KeyframeId> part) {
-  const std::vector<Step> steps = StepsOf(map, part);
+std::map<KeyframeId, double> SlipVariances(const Map& map, std::span<const KeyframeId> part,
+                                           const MedianDepths& depths) {
+  const std::vector<Step> steps = StepsOf(map, part, depths);
   std::map<KeyframeId, double> variances;
   double sum = 0.0;
   for (size_t i = 0; i < part.size(); ++i) {
@@ -147,19 +160,25 @@ std::map<KeyframeId, double> SlipVariances(const Map& map, std::span<const Keyfr
 
 }  // namespace
 
+MedianDepths MedianDepthsOf(const Map& map, std::span<const KeyframeId> part) {
+  MedianDepths depths;
+  for (const KeyframeId id : part) depths[id] = MedianDepth(map, *map.FindKeyframe(id));
+  return depths;
+}
+
 std::vector<Matrix7> LinkCovariances(const Map& map, std::span<const KeyframeId> part,
-                                     std::span<const KeyframePair> links) {
+                                     std::span<const KeyframePair> links, const MedianDepths& depths) {
   std::vector<Matrix7> covariances = LinkInformation(map, links);
   const bool has_scale = map.FindKeyframe(part.front())->features->calibration.sensor == SensorType::kMono;
   std::map<KeyframeId, double> slips;
-  if (has_scale) slips = SlipVariances(map, part);
+  if (has_scale) slips = SlipVariances(map, part, depths);
   for (size_t i = 0; i < links.size(); ++i) {
     const auto [older, newer] = links[i];
     if (older == part.front() || newer == part.back()) {
       covariances[i].setZero();
       continue;
     }
-    covariances[i] = BoundedInverse(covariances[i], MedianDepth(map, *map.FindKeyframe(newer)), has_scale);
+    covariances[i] = BoundedInverse(covariances[i], depths.at(newer), has_scale);
     if (has_scale) covariances[i](6, 6) += slips.at(newer) - slips.at(older);
   }
   return covariances;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -17,8 +18,12 @@ struct KeyframePair {
   KeyframeId newer;
 };
 
+// By keyframe: how far its landmarks are, in units of the map (MedianDepth).
+using MedianDepths = std::map<KeyframeId, double>;
+MedianDepths MedianDepthsOf(const Map& map, std::span<const KeyframeId> part);
+
 // By link: the covariance of older_from_newer, of its error's tangent (PoseGraphEdge) in the newer camera's axes and
-// units; never infinite. `part`: all keyframes of the part of the map that holds the links, by id.
+// units; never infinite. `part`: all keyframes of the part of the map that holds the links, by id; `depths`: theirs.
 //
 // 1. What common landmarks leave open. Cut at a link, the map is two bodies: one as the keyframes up to `older` know
 // it, the other as those from `newer` on do. What both know of a common landmark holds the two together:
@@ -36,7 +41,7 @@ struct KeyframePair {
 // kPlausibleChange of the common part of d(ln speed) and d(ln median depth) counts as standard deviation of the log
 // scale, spread over those two seconds.
 std::vector<Matrix7> LinkCovariances(const Map& map, std::span<const KeyframeId> part,
-                                     std::span<const KeyframePair> links);
+                                     std::span<const KeyframePair> links, const MedianDepths& depths);
 
 // Standard deviations that are never exceeded in 1.
 struct LinkBounds {

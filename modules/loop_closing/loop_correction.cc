@@ -52,11 +52,12 @@ void AddPart(const Map& map, const std::vector<KeyframeId>& part, const Sim3& ne
     problem.nodes.push_back({id, new_from_old * PoseOf(map, id)});
   }
   const std::vector<KeyframePair> links = EssentialLinks(map, in_part, min_shared);
-  const std::vector<Matrix7> covariances = LinkCovariances(map, part, links);
+  const MedianDepths depths = MedianDepthsOf(map, part);
+  const std::vector<Matrix7> covariances = LinkCovariances(map, part, links, depths);
   for (size_t i = 0; i < links.size(); ++i) {
     const auto [older, newer] = links[i];
     problem.edges.push_back({in_part[newer], in_part[older], PoseOf(map, older).Inverse() * PoseOf(map, newer), 1.0,
-                             MedianDepth(map, *map.FindKeyframe(newer)), covariances[i]});
+                             depths.at(newer), covariances[i]});
   }
   node_of.merge(in_part);
 }

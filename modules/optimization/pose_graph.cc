@@ -21,8 +21,9 @@ bool IsFinite(const Sim3& pose) {
 bool IsFinite(const PoseGraphProblem& problem) {
   return std::all_of(problem.nodes.begin(), problem.nodes.end(),
                      [](const PoseGraphNode& node) { return IsFinite(node.world_from_keyframe); }) &&
-         std::all_of(problem.edges.begin(), problem.edges.end(),
-                     [](const PoseGraphEdge& edge) { return IsFinite(edge.to_from_from); });
+         std::all_of(problem.edges.begin(), problem.edges.end(), [](const PoseGraphEdge& edge) {
+           return IsFinite(edge.to_from_from) && edge.covariance.allFinite();
+         });
 }
 
 // Nodes that a chain of edges connects with a fixed one: all others could drift away together.

@@ -38,7 +38,16 @@ class World {
     std::vector<KeyframePair> links;
     for (int k = 0; k < kNumKeyframes; ++k) part.push_back({k});
     for (int k = 1; k < kNumKeyframes; ++k) links.push_back({{k - 1}, {k}});
-    return LinkCovariances(map_, part, links);
+    return LinkCovariances(map_, part, links, MedianDepthsOf(map_, part));
+  }
+
+  // As adjustments do with false points.
+  void MoveOnePointBehindAllCameras() {
+    MapEditor editor(map_);
+    Landmark landmark = *map_.FindLandmark(old_points_.front());
+    landmark.position_in_world.z() *= -1.0;
+    editor.ChangeLandmark(old_points_.front(), landmark);
+    (void)editor.Finish({kNumKeyframes - 1});
   }
 
  private:
@@ -104,6 +113,17 @@ TEST(LinkCovariances, FarLandmarksHoldTheRotationButNeitherScaleNorTranslation) 
   EXPECT_GT(std::sqrt(far[kLink](6, 6)), 0.3);
   EXPECT_GT(far[kLink](2, 2), 100.0 * near[kLink](2, 2));
   EXPECT_LT(std::sqrt(far[kLink].block<3, 3>(3, 3).trace()), 0.01);
+}
+
+TEST(LinkCovariances, APointBehindAllOfItsObserversTellsNothing) {
+  World world({});
+  const std::vector<Matrix7> before = world.Covariances();
+  world.MoveOnePointBehindAllCameras();
+  const std::vector<Matrix7> after = world.Covariances();
+  for (size_t i = 0; i < after.size(); ++i) {
+    ASSERT_TRUE(after[i].allFinite()) << i;
+    EXPECT_GE(after[i].trace(), 0.99 * before[i].trace()) << i;
+  }
 }
 
 TEST(LinkCovariances, ArePositiveAndBounded) {

@@ -167,6 +167,9 @@ TEST(OptimizePoseGraph, NothingFreeOrNotFiniteGivesNothing) {
   spoilt = circuit.problem;
   spoilt.edges[3].to_from_from.rotation.w() = kNaN;
   EXPECT_FALSE(OptimizePoseGraph(spoilt, {}).has_value());
+  spoilt = circuit.problem;
+  spoilt.edges[3].covariance(2, 2) = kNaN;
+  EXPECT_FALSE(OptimizePoseGraph(spoilt, {}).has_value());
 }
 
 TEST(OptimizePoseGraph, MalformedProblemsThrowWithASentence) {
