@@ -17,8 +17,8 @@ struct Others {
   double share = 1.0;  // of the landmarks must be observed by so many
 };
 
-// Whether `is_well_observed` holds for more than this share of the keyframe's landmarks. It is given the landmark and the
-// level at which the keyframe observes it.
+// Whether `is_well_observed` holds for more than this share of the keyframe's landmarks. It is given the landmark and
+// the level at which the keyframe observes it.
 template <class IsWellObserved>
 bool HoldsForMost(const Keyframe& keyframe, double share, IsWellObserved is_well_observed) {
   const auto num_landmarks = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(),

@@ -64,8 +64,8 @@ class KeyframeCuller {
   explicit KeyframeCuller(const KeyframeCullingOptions& options);
 
   // Removes the redundant keyframes among those that share landmarks with `center`, the newest one. Their children pass
-  // to their parents, and `removed` remembers where they were. Roots of the spanning tree stay, and so do keyframes that
-  // closed a loop. Every other change of the map must go through the editor of some call.
+  // to their parents, and `removed` remembers where they were. Roots of the spanning tree stay, and so do keyframes
+  // that closed a loop. Every other change of the map must go through the editor of some call.
   void Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
 
  private:

@@ -43,8 +43,9 @@ void RefreshDescriptions(MapEditor& editor) {
     if (!IsDetermined(editor.map(), id)) {
       editor.RemoveLandmark(id);
     } else {
+      const bool is_reobserved = editor.reobserved_landmarks().Has(id);
       editor.ChangeLandmark(
-          id, editor.reobserved_landmarks().Has(id) ? DescribeLandmark(editor.map(), id) : DescribeMovedLandmark(editor.map(), id));
+          id, is_reobserved ? DescribeLandmark(editor.map(), id) : DescribeMovedLandmark(editor.map(), id));
     }
   }
 }
