@@ -5,9 +5,12 @@
 
 #include "map/spanning_tree.h"
 #include "optimization/local_adjustment.h"
+#include "optimization/long_tracks.h"
 
 namespace tessera {
 namespace {
+
+constexpr int kMaxObservers = 40;  // of a landmark, before they count as observers of several
 
 LocalWindow WholePart(const Map& map, KeyframeId member) {
   LocalWindow window;
@@ -30,14 +33,16 @@ GlobalAdjustment AdjustGlobally(const Map& map, KeyframeId asked, const BundleOp
   adjustment.delta = map.next_delta() - 1;
   const LocalWindow part = WholePart(map, asked);
   if (part.inner.size() < 2 || part.landmarks.empty()) return adjustment;
-  const BundleProblem problem = BuildLocalProblem(map, part, {});
+  BundleProblem problem = BuildLocalProblem(map, part, {});
+  const size_t num_points = problem.points.size();
+  SplitLongTracks(kMaxObservers, problem);
   const std::optional<BundleResult> result = AdjustBundle(problem, options);
   if (!result || !(result->final_cost < result->initial_cost)) return adjustment;
   adjustment.is_usable = true;
   for (size_t i = 0; i < problem.poses.size(); ++i) {
     adjustment.poses.push_back({problem.poses[i].id, result->camera_from_world[i].Inverse()});
   }
-  for (size_t i = 0; i < problem.points.size(); ++i) {
+  for (size_t i = 0; i < num_points; ++i) {
     adjustment.points.push_back({problem.points[i].id, result->positions_in_world[i]});
   }
   return adjustment;
