@@ -10,6 +10,8 @@
 namespace tessera {
 namespace {
 
+constexpr uint8_t kUnknownLevel = 255, kNoLevel = 254;
+
 // Who may stand in for a keyframe.
 struct Others {
   int last_visit = 0;  // those of later ones don't count
@@ -106,12 +108,6 @@ void Visits::Add(KeyframeId id, const Keyframe& keyframe) {
 int Visits::Of(KeyframeId id) const {
   return static_cast<int>(std::upper_bound(begins_.begin(), begins_.end(), id) - begins_.begin());
 }
-
-namespace {
-
-constexpr uint8_t kUnknownLevel = 255, kNoLevel = 254;
-
-}  // namespace
 
 int ObserverLevels::Of(const Map& map, LandmarkId id) {
   const auto index = static_cast<size_t>(id.value);

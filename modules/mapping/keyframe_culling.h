@@ -65,7 +65,8 @@ class KeyframeCuller {
 
   // Removes the redundant keyframes among those that share landmarks with `center`, the newest one. Their children pass
   // to their parents, and `removed` remembers where they were. Roots of the spanning tree stay, and so do keyframes
-  // that closed a loop. Every other change of the map must go through the editor of some call.
+  // that closed a loop. Since the last call, observations may have changed only by edits of `editor`; between the
+  // calls, landmarks may have been removed as well.
   void Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
 
  private:
