@@ -36,7 +36,7 @@ class MapArchive {
 
  private:
   std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest snapshot, or all
-  std::deque<MapDelta> snapshots_;                      // features are shared with the map, so these cost little
+  std::deque<MapDelta> snapshots_;                      // by age; features are shared with the map
 };
 
 }  // namespace tessera

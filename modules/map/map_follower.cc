@@ -1,18 +1,21 @@
 #include "map/map_follower.h"
 
+#include <iterator>
 #include <utility>
 
 namespace tessera {
 
 void MapFollower::Receive(Delta delta) {
   // What follows a snapshot that is on its way may have a number that was given out before.
-  if ((delta->number < next_delta_ && !needs_snapshot_) || waiting_.size() >= kMaxWaiting) return;
+  if (delta->number < next_delta_ && !needs_snapshot_) return;
   if (delta->number == next_delta_ && !needs_snapshot_) {
     lacks_start_ = false;
     collected_.reset();
   }
   const int64_t number = delta->number;
   waiting_.try_emplace(number, std::move(delta));
+  // The last one goes: the one that closes the gap must always find room.
+  if (waiting_.size() > kMaxWaiting) waiting_.erase(std::prev(waiting_.end()));
 }
 
 void MapFollower::Receive(const MapSnapshotPage& page) {

@@ -52,7 +52,7 @@ class MapFollower {
   void Complete();
   bool IsAnsweredSoon(const MapRequest& request) const;
 
-  // Deltas kept behind a gap; more are dropped, and asked for when the gap is closed.
+  // Deltas kept behind a gap, the first ones; more are dropped, and asked for when the gap is closed.
   static constexpr size_t kMaxWaiting = 256;
 
   bool lacks_start_;

@@ -103,6 +103,25 @@ TEST(MapFollower, AsksForAShortGapAndGetsTheDeltas) {
   ExpectEqual(replica, owner.map());
 }
 
+// A global adjustment of a large map took so long that 880 deltas passed by the adjuster's receive buffer.
+TEST(MapFollower, AGapIsClosedHoweverMuchCameBehindIt) {
+  Owner owner(3);
+  MapFollower follower;
+  Map replica;
+  std::vector<MapFollower::Delta> deltas;
+  for (int i = 0; i < 400; ++i) deltas.push_back(owner.Next(5));
+  for (int i = 5; i < 400; ++i) follower.Receive(deltas[static_cast<size_t>(i)]);
+  EXPECT_THAT(follower.Take(), testing::IsEmpty());
+  for (int i = 0; i < 50 && replica.next_delta() < owner.map().next_delta(); ++i) {
+    follower.Expect(400);
+    const std::optional<MapRequest> request = follower.TakeRequest();
+    ASSERT_TRUE(request.has_value());
+    owner.Answer(*request, follower);
+    ASSERT_THAT(Update(follower, replica), IsSuccess());
+  }
+  ExpectEqual(replica, owner.map());
+}
+
 TEST(MapFollower, AsksForALostTailWhenToldOfIt) {
   Owner owner(9);
   MapFollower follower;
