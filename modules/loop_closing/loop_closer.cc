@@ -11,6 +11,7 @@ Result<> LoopCloserOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(candidates.Check());
   TESSERA_RETURN_IF_FAILED(verification.Check());
   TESSERA_RETURN_IF_FAILED(correction.Check());
+  if (!(max_contradiction_sigmas > 0.0)) return Failed("a loop must be allowed to contradict the map by something");
   return relocalization.Check();
 }
 
@@ -43,8 +44,13 @@ LoopResult LoopCloser::FindLoop(KeyframeId id) const {
     result.num_matched += steps.is_matched ? 1 : 0;
     result.num_aligned += steps.is_aligned ? 1 : 0;
     if (!place) continue;
-    result.corrections = ComputeCorrections(map_, id, *place, options_.correction);
-    if (result.corrections.empty()) continue;
+    std::optional<LoopCorrection> correction = ComputeCorrection(map_, id, *place, options_.correction);
+    if (!correction) continue;
+    if (correction->contradiction_sigmas > options_.max_contradiction_sigmas * place->seen_share) {
+      ++result.num_contradicted;
+      continue;
+    }
+    result.corrections = std::move(correction->keyframes);
     result.matched = place->matched;
     result.matched_from_current = place->matched_from_current;
     result.joins_parts = RootOf(map_, id) != RootOf(map_, place->matched);

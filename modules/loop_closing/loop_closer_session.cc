@@ -52,6 +52,7 @@ LoopResult LoopCloserSession::FindLoop() {
   counts_.num_consistent += result.num_consistent;
   counts_.num_matched += result.num_matched;
   counts_.num_aligned += result.num_aligned;
+  counts_.num_contradicted += result.num_contradicted;
   counts_.num_confirmed += result.matched.valid() ? 1 : 0;
   return result;
 }

@@ -24,6 +24,7 @@ struct LoopCloserSessionOptions {
 // How far candidates came, summed over all keyframes, and the questions.
 struct LoopCounts {
   int64_t num_candidates = 0, num_consistent = 0, num_matched = 0, num_aligned = 0, num_confirmed = 0;
+  int64_t num_contradicted = 0;
   int64_t num_asked = 0, num_found = 0;
 };
 

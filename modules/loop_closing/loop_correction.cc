@@ -1,6 +1,7 @@
 #include "loop_closing/loop_correction.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <set>
@@ -109,16 +110,18 @@ PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const V
   return problem;
 }
 
-std::vector<LoopResult::Correction> ComputeCorrections(const Map& map, KeyframeId current, const VerifiedPlace& place,
-                                                       const CorrectionOptions& options) {
+std::optional<LoopCorrection> ComputeCorrection(const Map& map, KeyframeId current, const VerifiedPlace& place,
+                                                const CorrectionOptions& options) {
   const PoseGraphProblem problem = BuildEssentialGraph(map, current, place, options);
   const std::optional<std::vector<Sim3>> solved = OptimizePoseGraph(problem, options.graph);
-  std::vector<LoopResult::Correction> corrections;
-  for (size_t i = 0; solved && i < problem.nodes.size(); ++i) {
-    corrections.push_back({problem.nodes[i].id, (*solved)[i] * PoseOf(map, problem.nodes[i].id).Inverse()});
+  if (!solved) return std::nullopt;
+  LoopCorrection correction;
+  for (size_t i = 0; i < problem.nodes.size(); ++i) {
+    correction.keyframes.push_back({problem.nodes[i].id, (*solved)[i] * PoseOf(map, problem.nodes[i].id).Inverse()});
   }
-  std::ranges::sort(corrections, {}, &LoopResult::Correction::id);
-  return corrections;
+  std::ranges::sort(correction.keyframes, {}, &LoopResult::Correction::id);
+  correction.contradiction_sigmas = std::sqrt(2.0 * PoseGraphCostAt(*solved, problem, options.graph));
+  return correction;
 }
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 // The correction of the map that a loop asks for: the pose of every keyframe, so that both visits of a place agree.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/result.h"
@@ -31,9 +32,16 @@ struct CorrectionOptions {
 PoseGraphProblem BuildEssentialGraph(const Map& map, KeyframeId current, const VerifiedPlace& place,
                                      const CorrectionOptions& options);
 
-// Corrections by keyframe id, of every keyframe of the optimized essential graph. Without a link across a gap, the part
-// that began later moves as a whole, and the other stays. Empty: no solution.
-std::vector<LoopResult::Correction> ComputeCorrections(const Map& map, KeyframeId current, const VerifiedPlace& place,
-                                                       const CorrectionOptions& options);
+struct LoopCorrection {
+  std::vector<LoopResult::Correction> keyframes;  // by id
+  // By how many standard deviations the map contradicts the loop: sqrt(2 cost) of the optimized graph, as all edges but
+  // the loop's measure the map as it was. Loops of a sound map have 1 to 9, where the scale had slipped 18 to 150.
+  double contradiction_sigmas = 0.0;
+};
+
+// Corrects every keyframe of the essential graph. Without a link across a gap, the part that began later moves as a
+// whole, and the other stays. nullopt: no solution.
+std::optional<LoopCorrection> ComputeCorrection(const Map& map, KeyframeId current, const VerifiedPlace& place,
+                                                const CorrectionOptions& options);
 
 }  // namespace tessera

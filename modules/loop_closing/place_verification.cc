@@ -1,5 +1,6 @@
 #include "loop_closing/place_verification.h"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -113,12 +114,13 @@ std::optional<VerifiedPlace> VerifyPlace(const Map& map, const PlaceDatabase& pl
       RefineSimilarity(camera, DuplicatePairs(map, frame, matched, current), aligned->first_from_second, similarity);
   if (refined.num_inliers < similarity.min_inliers) return std::nullopt;
 
-  VerifiedPlace place{candidate, {}, {}};
+  VerifiedPlace place{.matched = candidate, .matched_from_current = {}, .seen = {}};
   place.matched_from_current =
       Sim3::From(matched.world_from_camera.Inverse() * frame.world_from_camera, refined.first_from_second.scale);
   for (size_t i = 0; i < frame.points.size(); ++i) {
     if (frame.points[i].valid()) place.seen.push_back({static_cast<int32_t>(i), frame.points[i].id.landmark});
   }
+  place.seen_share = static_cast<double>(place.seen.size()) / std::max(1, NumExpected(landmarks, frame));
   return place;
 }
 

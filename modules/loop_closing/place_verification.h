@@ -34,6 +34,7 @@ struct VerifiedPlace {
   KeyframeId matched;
   Sim3 matched_from_current;       // scale 1 but for mono
   std::vector<SeenLandmark> seen;  // landmarks of the place that the current keyframe observes, by keypoint
+  double seen_share = 1.0;         // of those that it should see
 };
 
 // The steps that a candidate passed.

@@ -145,6 +145,12 @@ int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, Tracke
   return frame.NumPoints();
 }
 
+int NumExpected(const KnownPoints& points, const TrackedFrame& frame) {
+  const View view(frame.view->calibration(), frame.world_from_camera);
+  return static_cast<int>(std::count_if(points.begin(), points.end(),
+                                        [&](const auto& point) { return Expect(view, point.second).has_value(); }));
+}
+
 double Coverage(const KnownPoints& points, const TrackedFrame& frame) {
   constexpr int kCellsAcross = 16, kMinExpected = 3;
   const CameraCalibration& camera = frame.view->calibration();

@@ -56,6 +56,9 @@ int MatchLocal(const KnownPoints& points, double radius_px, const MatchOptions& 
 // Known points, wherever they may be in the image, by descriptor alone. Sets frame.points; returns how many.
 int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, TrackedFrame& frame);
 
+// How many of the points the frame should see, at its pose.
+int NumExpected(const KnownPoints& points, const TrackedFrame& frame);
+
 // The share of image cells with a match (1/16 of the width each), of those cells in which the frame, at its pose,
 // should see several of the points. An object found in two places, such as a parked car of the same make, agrees with a
 // pose as well as a place does; but what is around the object is not seen then.

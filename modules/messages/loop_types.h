@@ -37,7 +37,8 @@ struct LoopResult {
   int32_t num_candidates = 0;
   int32_t num_consistent = 0;  // ... so many of them also from the keyframes before, ...
   int32_t num_matched = 0;     // ... had enough matching landmarks, ...
-  int32_t num_aligned = 0;  // ... and a similarity that many of them agree with; `matched` is confirmed by more of them
+  int32_t num_aligned = 0;       // ... and a similarity that many of them agree with; more confirm `matched` ...
+  int32_t num_contradicted = 0;  // ... or did for these, which contradict the map by far
 };
 
 // A bundle adjustment of all that hangs together with a closed loop, begun on the map after the delta that answers

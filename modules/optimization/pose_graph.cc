@@ -4,6 +4,7 @@
 #include <ceres/solver.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -140,6 +141,29 @@ class PoseGraphSolver {
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
 };
 
+template <int kSize>
+double CostAt(const std::vector<Sim3>& world_from_keyframe, const PoseGraphProblem& problem,
+              const PoseGraphOptions& options) {
+  const std::array<double, kSize> unmoved{};
+  const std::array<const double*, 2> tangents{unmoved.data(), unmoved.data()};
+  const auto node_at = [&](int index) {
+    MovingNode node;
+    node.base = world_from_keyframe[static_cast<size_t>(index)];
+    node.tangent = unmoved.data();
+    node.has_scale = kSize == 7;
+    node.Update();
+    return node;
+  };
+  double sum = 0.0;
+  for (const PoseGraphEdge& edge : problem.edges) {
+    const MovingNode from = node_at(edge.from), to = node_at(edge.to);
+    Eigen::Matrix<double, kSize, 1> residual;
+    PoseGraphCost<kSize>(edge, options, from, to).Evaluate(tangents.data(), residual.data(), nullptr);
+    sum += residual.squaredNorm();
+  }
+  return 0.5 * sum;
+}
+
 }  // namespace
 
 Result<> PoseGraphProblem::Check() const {
@@ -179,6 +203,12 @@ std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& probl
   if (!IsFinite(problem)) return std::nullopt;
   return problem.has_scale ? PoseGraphSolver<7>(problem, options).Solve()
                            : PoseGraphSolver<6>(problem, options).Solve();
+}
+
+double PoseGraphCostAt(const std::vector<Sim3>& world_from_keyframe, const PoseGraphProblem& problem,
+                       const PoseGraphOptions& options) {
+  return problem.has_scale ? CostAt<7>(world_from_keyframe, problem, options)
+                           : CostAt<6>(world_from_keyframe, problem, options);
 }
 
 }  // namespace tessera

@@ -41,6 +41,7 @@ struct Layout<loop_result_t> {
     fields.Count(message.num_consistent, result.num_consistent);
     fields.Count(message.num_matched, result.num_matched);
     fields.Count(message.num_aligned, result.num_aligned);
+    fields.Count(message.num_contradicted, result.num_contradicted);
     fields.Check(result.answers.valid(), "its keyframe's number is negative");
     fields.Check(result.matched < result.answers, "its matched keyframe is not older");
     fields.List(message.num_corrections, message.corrections, result.corrections);

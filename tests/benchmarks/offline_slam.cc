@@ -156,16 +156,17 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
   PrintTimes("mapper", run.map_ms, sequence.frames.size());
   PrintTimes("loops", run.loop_ms, sequence.frames.size());
   PrintTimes("adjuster", run.adjust_ms, sequence.frames.size());
-  int num_candidates = 0, num_consistent = 0, num_matched = 0, num_aligned = 0, num_confirmed = 0;
+  int num_candidates = 0, num_consistent = 0, num_matched = 0, num_aligned = 0, num_confirmed = 0, num_contradicted = 0;
   for (const LoopResult& loop : run.loops) {
     num_candidates += loop.num_candidates;
     num_consistent += loop.num_consistent;
     num_matched += loop.num_matched;
     num_aligned += loop.num_aligned;
+    num_contradicted += loop.num_contradicted;
     num_confirmed += loop.matched.valid() ? 1 : 0;
   }
-  std::printf("loop candidates %d, consistent %d, matched %d, aligned %d, confirmed %d, void %ld, closed %zu\n",
-              num_candidates, num_consistent, num_matched, num_aligned, num_confirmed,
+  std::printf("loop candidates %d, consistent %d, matched %d, aligned %d, contradicted %d, confirmed %d, void %ld, closed %zu\n",
+              num_candidates, num_consistent, num_matched, num_aligned, num_contradicted, num_confirmed,
               static_cast<long>(run.mapper.num_void_loops()), map.closed_loops().size());
 }
 

@@ -53,6 +53,7 @@ void ExpectSame(const LoopResult& a, const LoopResult& b) {
   EXPECT_EQ(a.num_consistent, b.num_consistent);
   EXPECT_EQ(a.num_matched, b.num_matched);
   EXPECT_EQ(a.num_aligned, b.num_aligned);
+  EXPECT_EQ(a.num_contradicted, b.num_contradicted);
   ASSERT_EQ(a.corrections.size(), b.corrections.size());
   for (size_t i = 0; i < a.corrections.size(); ++i) {
     EXPECT_EQ(a.corrections[i].id, b.corrections[i].id);
@@ -177,6 +178,29 @@ TEST(LoopCloser, RefusesAThingThatStandsInTwoPlaces) {
       ASSERT_THAT(of_first.ApplyDelta(planted.deltas()[static_cast<size_t>(k)]), IsSuccess());
     EXPECT_FALSE(of_first.Relocalize(request).reference.valid());
   }
+}
+
+// Streets alike, with the same cars parked at the same distances: the place fits a pose, but the map knows better.
+TEST(LoopCloser, RefusesAPlaceThatContradictsTheMap) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  PlantedMap planted(world);
+  // One part: the map says that the camera went on, and that the second visit was elsewhere.
+  for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {k - 1}, 0);
+  for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {kVisit + k - 1}, 1, Away(1.0));
+  const auto find_loop = [&](double max_contradiction_sigmas) {
+    LoopCloserOptions options;
+    options.max_contradiction_sigmas = max_contradiction_sigmas;
+    LoopCloser closer(ShippedVocabulary(), options);
+    for (const MapDelta& delta : planted.deltas()) EXPECT_THAT(closer.ApplyDelta(delta), IsSuccess());
+    return closer.FindLoop({2 * kVisit - 1});
+  };
+  const LoopResult refused = find_loop(1.0), allowed = find_loop(LoopCloserOptions{}.max_contradiction_sigmas);
+  EXPECT_GT(refused.num_contradicted, 0);
+  EXPECT_FALSE(refused.matched.valid());
+  EXPECT_TRUE(refused.corrections.empty());
+  EXPECT_TRUE(refused.seen.empty());
+  EXPECT_EQ(allowed.num_contradicted, 0) << "nothing ties the two visits, so this map doesn't know";
+  EXPECT_TRUE(allowed.matched.valid());
 }
 
 TEST(LoopCloser, NoLoopOnTheFirstVisitNorForAKeyframeThatIsGone) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -36,6 +38,8 @@ Map MapOf(const SyntheticCircuit& circuit, SensorType sensor) {
 
 VerifiedPlace LoopOf(const SyntheticCircuit& circuit) { return {{0}, circuit.problem.edges.back().to_from_from, {}}; }
 
+Sim3 PoseOf(const Map& map, int64_t keyframe) { return map.FindKeyframe({keyframe})->WorldFromKeyframe(); }
+
 std::vector<Sim3> KeyframePoses(const Map& map) {
   std::vector<Sim3> poses;
   map.keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) { poses.push_back(keyframe.WorldFromKeyframe()); });
@@ -53,7 +57,7 @@ TEST(LoopCorrection, SpreadsTheErrorOfALoopOverTheRing) {
     const std::vector<Sim3> before = KeyframePoses(map);
     const KeyframeId current{119};
     const VerifiedPlace place = LoopOf(circuit);
-    const auto corrections = ComputeCorrections(map, current, place, {});
+    const auto corrections = ComputeCorrection(map, current, place, {}).value().keyframes;
     ASSERT_EQ(corrections.size(), 120U);
     Corrections by_keyframe;
     for (size_t i = 0; i < corrections.size(); ++i) {
@@ -78,6 +82,27 @@ TEST(LoopCorrection, SpreadsTheErrorOfALoopOverTheRing) {
       EXPECT_LT(step.translation.norm(), 0.1) << i;
       EXPECT_NEAR(step.scale, 1.0, 0.02) << i;
     }
+  }
+}
+
+// The same loop, and one that says that the camera came back at a right angle.
+TEST(LoopCorrection, TellsHowFarTheMapContradictsALoop) {
+  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
+    SyntheticCircuitOptions options;
+    options.num_keyframes = 120;
+    options.has_scale = sensor == SensorType::kMono;
+    const SyntheticCircuit circuit = MakeSyntheticCircuit(options);
+    const Map map = MapOf(circuit, sensor);
+    VerifiedPlace place = LoopOf(circuit);
+    const double of_truth = ComputeCorrection(map, {119}, place, {}).value().contradiction_sigmas;
+    EXPECT_GT(of_truth, 0.0);
+    place.matched_from_current =
+        Sim3{1.0, ExpSO3({0.0, std::numbers::pi / 2.0, 0.0}), {}} * place.matched_from_current;
+    EXPECT_GT(ComputeCorrection(map, {119}, place, {}).value().contradiction_sigmas, 10.0 * of_truth)
+        << ToString(sensor);
+    place.matched_from_current = (PoseOf(map, 0).Inverse() * PoseOf(map, 119));
+    EXPECT_NEAR(ComputeCorrection(map, {119}, place, {}).value().contradiction_sigmas, 0.0, 1e-3)
+        << "what the map says itself";
   }
 }
 
@@ -116,7 +141,7 @@ TEST(LoopCorrection, JoinsTwoParts) {
     const KeyframeId current = is_found_in_later ? KeyframeId{3} : KeyframeId{5};
     const KeyframeId matched = is_found_in_later ? KeyframeId{1} : KeyframeId{3};
     const Sim3 measured{1.4, ExpSO3({0.0, 0.3, 0.1}), {0.5, 0.0, 0.2}};
-    const auto corrections = ComputeCorrections(map, current, {matched, measured, {}}, {});
+    const auto corrections = ComputeCorrection(map, current, {matched, measured, {}}, {}).value().keyframes;
     ASSERT_EQ(corrections.size(), 6U);
     Corrections by_keyframe;
     for (size_t i = 0; i < corrections.size(); ++i) {
@@ -157,7 +182,7 @@ TEST(LoopCorrection, AGapBetweenTwoPartsClosesTheRing) {
     (void)editor.Finish({119});
     VerifiedPlace place = LoopOf(circuit);
     place.matched_from_current.scale /= elsewhere.scale;
-    const auto corrections = ComputeCorrections(map, {119}, place, {});
+    const auto corrections = ComputeCorrection(map, {119}, place, {}).value().keyframes;
     ASSERT_EQ(corrections.size(), 120U);
     std::vector<Sim3> joined;
     for (const LoopResult::Correction& correction : corrections) {

@@ -480,6 +480,7 @@ LoopResult DrawValue<LoopResult>(std::mt19937& generator, int size) {
   result.num_consistent = Draw(generator, 0, 9);
   result.num_matched = Draw(generator, 0, 9);
   result.num_aligned = Draw(generator, 0, 9);
+  result.num_contradicted = Draw(generator, 0, 9);
   if (size == 0) return result;
   result.matched = {Draw(generator, 0, 9)};
   result.matched_from_current = DrawSimilarity(generator);
@@ -495,6 +496,7 @@ bool AreSame(const LoopResult& a, const LoopResult& b) {
          AreSameSimilarity(a.matched_from_current, b.matched_from_current) && a.joins_parts == b.joins_parts &&
          a.seen == b.seen && a.num_candidates == b.num_candidates && a.num_consistent == b.num_consistent &&
          a.num_matched == b.num_matched && a.num_aligned == b.num_aligned &&
+         a.num_contradicted == b.num_contradicted &&
          AreSameLists(a.corrections, b.corrections, [](const auto& x, const auto& y) {
            return x.id == y.id && AreSameSimilarity(x.new_world_from_old, y.new_world_from_old);
          });

@@ -228,6 +228,7 @@ TEST(Codec, LoopsAndAdjustmentsOutOfRangeAreRefused) {
   ExpectRefused<LoopResult>([](LoopResult& result) { result.seen.back().landmark.value = -1; });
   ExpectRefused<LoopResult>([](LoopResult& result) { result.num_candidates = -1; });
   ExpectRefused<LoopResult>([](LoopResult& result) { result.num_aligned = -1; });
+  ExpectRefused<LoopResult>([](LoopResult& result) { result.num_contradicted = -1; });
   ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.answers.value = -1; });
   ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.delta = -1; });
   ExpectRefused<GlobalAdjustment>([](GlobalAdjustment& adjustment) { adjustment.poses.back().id.value = -1; });

@@ -79,6 +79,7 @@ void LoopCloserStage::ShowCounts() {
   show("loop_matched", counts.num_matched);
   show("loop_aligned", counts.num_aligned);
   show("loop_confirmed", counts.num_confirmed);
+  show("loop_contradicted", counts.num_contradicted);
   show("relocalization_asked", counts.num_asked);
   show("relocalization_found", counts.num_found);
 }

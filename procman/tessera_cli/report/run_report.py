@@ -93,9 +93,11 @@ def _describe_loop_checks(summary: Summary) -> str:
     candidates, consistent, matched, aligned, confirmed = (
         int(counts.get(f"loop_{name}", 0)) for name in ("candidates", "consistent", "matched", "aligned", "confirmed")
     )
+    contradicted = int(counts.get("loop_contradicted", 0))
     return (
         f"loop candidates: {candidates} places looked alike, {consistent} also from the keyframes before, "
         f"{matched} shared enough landmarks, {aligned} agreed on the camera's pose, {confirmed} were confirmed"
+        + (f", {contradicted} refused since they contradict the map" if contradicted else "")
     )
 
 
