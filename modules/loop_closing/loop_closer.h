@@ -23,8 +23,9 @@ struct LoopCloserOptions {
   VerificationOptions verification;
   CorrectionOptions correction;
   RelocalizationOptions relocalization;
-  // A place may contradict the map (LoopCorrection) by this times the share of its landmarks that are seen: by 150 to 1500
-  // standard deviations. Streets with the same cars parked at the same distances, 276 m and a right angle apart: 5500.
+  // A place may contradict the map (LoopCorrection) by this times the share of its landmarks that are seen: by 150 to
+  // 1500 standard deviations. Streets with the same cars parked at the same distances, 276 m and a right angle apart:
+  // 5500.
   double max_contradiction_sigmas = 3000.0;
 
   // Fails if a value is out of range.

@@ -14,7 +14,8 @@ void MapArchive::Add(std::shared_ptr<const MapDelta> delta, const Map& map, std:
   snapshots_.push_back(map.Snapshot());
   if (snapshots_.size() <= 2) return;
   while (snapshots_.size() > 2 && (!awaited || snapshots_[1].number < *awaited)) snapshots_.pop_front();
-  // Only the first one is handed out. Of those that have to wait for that, the last two will do: each has all landmarks.
+  // Only the first one is handed out. Of those that have to wait for that, the last two will do: each has all
+  // landmarks.
   while (snapshots_.size() > 3) snapshots_.erase(snapshots_.begin() + 1);
   while (deltas_.front()->number <= snapshots_.front().number) deltas_.pop_front();
 }

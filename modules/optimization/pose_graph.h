@@ -68,8 +68,8 @@ struct PoseGraphOptions {
 // or options are malformed. nullopt where nothing is free, a value is not finite, or the solver found no step.
 std::optional<std::vector<Sim3>> OptimizePoseGraph(const PoseGraphProblem& problem, const PoseGraphOptions& options);
 
-// What is minimized, at world_from_keyframe by node. If all edges but one loop's measure where the nodes were, twice the
-// minimum is the chi-square, of at most 7 degrees of freedom, by which they contradict the loop.
+// What is minimized, at world_from_keyframe by node. If all edges but one loop's measure where the nodes were, twice
+// the minimum is the chi-square, of at most 7 degrees of freedom, by which they contradict the loop.
 double PoseGraphCostAt(const std::vector<Sim3>& world_from_keyframe, const PoseGraphProblem& problem,
                        const PoseGraphOptions& options);
 

@@ -165,9 +165,11 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
     num_contradicted += loop.num_contradicted;
     num_confirmed += loop.matched.valid() ? 1 : 0;
   }
-  std::printf("loop candidates %d, consistent %d, matched %d, aligned %d, contradicted %d, confirmed %d, void %ld, closed %zu\n",
-              num_candidates, num_consistent, num_matched, num_aligned, num_contradicted, num_confirmed,
-              static_cast<long>(run.mapper.num_void_loops()), map.closed_loops().size());
+  std::printf(
+      "loop candidates %d, consistent %d, matched %d, aligned %d, contradicted %d, confirmed %d, void %ld, closed "
+      "%zu\n",
+      num_candidates, num_consistent, num_matched, num_aligned, num_contradicted, num_confirmed,
+      static_cast<long>(run.mapper.num_void_loops()), map.closed_loops().size());
 }
 
 void Run(const Arguments& arguments, const FeatureSequence& sequence, int64_t map_delay_frames,

@@ -3,10 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include <algorithm>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "map/map_editor.h"
@@ -96,8 +95,7 @@ TEST(LoopCorrection, TellsHowFarTheMapContradictsALoop) {
     VerifiedPlace place = LoopOf(circuit);
     const double of_truth = ComputeCorrection(map, {119}, place, {}).value().contradiction_sigmas;
     EXPECT_GT(of_truth, 0.0);
-    place.matched_from_current =
-        Sim3{1.0, ExpSO3({0.0, std::numbers::pi / 2.0, 0.0}), {}} * place.matched_from_current;
+    place.matched_from_current = Sim3{1.0, ExpSO3({0.0, std::numbers::pi / 2.0, 0.0}), {}} * place.matched_from_current;
     EXPECT_GT(ComputeCorrection(map, {119}, place, {}).value().contradiction_sigmas, 10.0 * of_truth)
         << ToString(sensor);
     place.matched_from_current = (PoseOf(map, 0).Inverse() * PoseOf(map, 119));

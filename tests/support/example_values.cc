@@ -495,8 +495,7 @@ bool AreSame(const LoopResult& a, const LoopResult& b) {
   return a.answers == b.answers && a.matched == b.matched &&
          AreSameSimilarity(a.matched_from_current, b.matched_from_current) && a.joins_parts == b.joins_parts &&
          a.seen == b.seen && a.num_candidates == b.num_candidates && a.num_consistent == b.num_consistent &&
-         a.num_matched == b.num_matched && a.num_aligned == b.num_aligned &&
-         a.num_contradicted == b.num_contradicted &&
+         a.num_matched == b.num_matched && a.num_aligned == b.num_aligned && a.num_contradicted == b.num_contradicted &&
          AreSameLists(a.corrections, b.corrections, [](const auto& x, const auto& y) {
            return x.id == y.id && AreSameSimilarity(x.new_world_from_old, y.new_world_from_old);
          });
