@@ -10,12 +10,6 @@
 namespace tessera {
 namespace {
 
-int64_t BytesOf(const CameraFrame& frame) {
-  return static_cast<int64_t>(frame.left.pixels.size() + frame.right.pixels.size() + 2 * frame.depth.pixels.size());
-}
-
-int64_t BytesOf(const ColorImage& image) { return static_cast<int64_t>(sizeof(Rgb) * image.pixels.size()); }
-
 bool HasImages(const CameraFrame& frame, const CameraCalibration& camera) {
   const auto fits = [&](const auto& image) {
     return image.width == camera.width_px && image.height == camera.height_px;
@@ -31,29 +25,50 @@ double Displacement(const Rigid3& from, const Rigid3& to, double range) {
 
 }  // namespace
 
+OccupancySession::OccupancySession(const OccupancySessionOptions& options)
+    : options_(options),
+      scratch_(options.scratch_dir.empty() ? nullptr : std::make_unique<ScratchFile>(options.scratch_dir)) {}
+
 void OccupancySession::Receive(const CameraFrame& frame) {
   if (frame.sensor == SensorType::kMono || images_.contains(frame.id)) return;
   const bool may_be_keyframe =
       frame.id > last_decided_ || announced_.contains(frame.id) || keyframe_at_.contains(frame.id);
-  if (!may_be_keyframe || image_bytes_ + BytesOf(frame) > options_.max_image_bytes) return;
-  image_bytes_ += BytesOf(frame);
-  images_.emplace(frame.id, frame);
+  if (!may_be_keyframe) return;
+  WaitingImage<CameraFrame> waiting{frame, std::nullopt};
+  if (image_bytes_ + BytesOf(frame) > options_.max_image_bytes && !SpillToDisk(waiting)) return;
+  image_bytes_ += waiting.bytes_in_memory();
+  images_.emplace(frame.id, std::move(waiting));
+}
+
+template <class Images>
+bool OccupancySession::SpillToDisk(WaitingImage<Images>& waiting) {
+  return scratch_ != nullptr && MoveToDisk(waiting, *scratch_);
+}
+
+template <class Images>
+void OccupancySession::Forget(const WaitingImage<Images>& waiting) {
+  image_bytes_ -= waiting.bytes_in_memory();
+  if (waiting.place) scratch_->Drop(*waiting.place);
 }
 
 // The first one counts: a camera that was started again tells those of keyframes before once more.
 void OccupancySession::Receive(const ColorFrame& color) {
   if (!options_.with_color || colors_.contains(color.id)) return;
-  const bool has_room = image_bytes_ + BytesOf(color.image) <= options_.max_image_bytes;
-  const ColorImage& kept = colors_[color.id] = has_room ? color.image : ColorImage();
-  image_bytes_ += BytesOf(kept);
+  WaitingImage<ColorImage> waiting{color.image, std::nullopt};
+  const bool has_room = image_bytes_ + BytesOf(color.image) <= options_.max_image_bytes / 2;
+  if (!has_room && !SpillToDisk(waiting) && image_bytes_ + BytesOf(color.image) > options_.max_image_bytes) {
+    waiting.images = {};
+  }
+  image_bytes_ += waiting.bytes_in_memory();
+  colors_[color.id] = std::move(waiting);
   ColorKeypoints(color.id);
 }
 
 ColorImage OccupancySession::TakeColor(FrameId frame) {
   const auto found = colors_.find(frame);
   if (found == colors_.end()) return {};
-  image_bytes_ -= BytesOf(found->second);
-  return std::exchange(found->second, {});
+  image_bytes_ -= found->second.bytes_in_memory();
+  return MoveBack(std::exchange(found->second, {}), scratch_.get()).value_or(ColorImage());
 }
 
 // If both the frame's keypoints and its color are there.
@@ -70,9 +85,15 @@ void OccupancySession::Receive(const PoseEstimate& pose) {
   if (pose.is_keyframe && !keyframe_at_.contains(pose.frame)) announced_.insert(pose.frame);
   last_decided_ = std::max(last_decided_, pose.frame);
   for (auto it = images_.begin(); it != images_.end() && it->first <= last_decided_;) {
-    const bool is_keyframe = announced_.contains(it->first) || keyframe_at_.contains(it->first);
-    if (!is_keyframe) image_bytes_ -= BytesOf(it->second);
-    it = is_keyframe ? std::next(it) : images_.erase(it);
+    auto& [frame, waiting] = *it;
+    if (!announced_.contains(frame) && !keyframe_at_.contains(frame)) {
+      Forget(waiting);
+      it = images_.erase(it);
+      continue;
+    }
+    const int64_t num_bytes = waiting.bytes_in_memory();
+    if (image_bytes_ > options_.max_image_bytes / 2 && SpillToDisk(waiting)) image_bytes_ -= num_bytes;
+    ++it;
   }
 }
 
@@ -150,14 +171,14 @@ std::optional<FrameId> OccupancySession::FindImage() const {
 bool OccupancySession::MakeScan() {
   const std::optional<FrameId> id = FindImage();
   if (!id) return false;
-  const auto image = images_.extract(*id);
-  const CameraFrame& frame = image.mapped();
-  image_bytes_ -= BytesOf(frame);
+  auto waiting = images_.extract(*id);
+  image_bytes_ -= waiting.mapped().bytes_in_memory();
+  const std::optional<CameraFrame> images = MoveBack(std::move(waiting.mapped()), scratch_.get());
   ColorImage color = TakeColor(*id);
-  if (!HasImages(frame, *camera_)) return true;
+  if (!images || !HasImages(*images, *camera_)) return true;
   if (color.width != camera_->width_px || color.height != camera_->height_px) color = {};
   scans_[keyframe_at_.at(*id)] = std::make_shared<const Scan>(
-      ScanFromImages(frame, color, *camera_, occupancy_->options(), options_.max_disparity_px));
+      ScanFromImages(*images, color, *camera_, occupancy_->options(), options_.max_disparity_px));
   has_map_changed_ = true;
   return true;
 }

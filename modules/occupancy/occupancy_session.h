@@ -14,30 +14,35 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "core/result.h"
+#include "core/scratch_file.h"
 #include "geometry/camera_frame.h"
 #include "map/map.h"
 #include "map/removed_keyframes.h"
 #include "messages/tracking_types.h"
 #include "occupancy/occupancy_map.h"
+#include "occupancy/waiting_image.h"
 
 namespace tessera {
 
 struct OccupancySessionOptions {
   OccupancyOptions map;        // what is 0 there is filled in by the sensor
   int max_disparity_px = 128;  // stereo: as features.max_disparity_px
-  // Images that are kept: they wait until it is known whether their frame becomes a keyframe, and then until they are
-  // made into scans. More are dropped.
+  // Images that are kept in memory: they wait until it is known whether their frame becomes a keyframe, and then until
+  // they are made into scans. Those of keyframes beyond half of it wait in a file of `scratch_dir`, as far as the disk
+  // has room. More are dropped.
   int64_t max_image_bytes = int64_t{256} << 20;
+  std::string scratch_dir;  // empty: none wait there
   // The camera tells each keyframe's color, or that it has none: scans wait for it.
   bool with_color = false;
 };
 
 class OccupancySession {
  public:
-  explicit OccupancySession(const OccupancySessionOptions& options) : options_(options) {}
+  explicit OccupancySession(const OccupancySessionOptions& options);
 
   void Receive(const CameraFrame& frame);
   void Receive(const ColorFrame& color);
@@ -71,6 +76,10 @@ class OccupancySession {
   int64_t num_waiting() const { return static_cast<int64_t>(plan_.size() + images_.size()); }
 
  private:
+  template <class Images>
+  bool SpillToDisk(WaitingImage<Images>& waiting);
+  template <class Images>
+  void Forget(const WaitingImage<Images>& waiting);
   std::optional<FrameId> FindImage() const;
   ColorImage TakeColor(FrameId frame);
   void ColorKeypoints(FrameId frame);
@@ -89,12 +98,15 @@ class OccupancySession {
   std::optional<CameraCalibration> camera_;
   std::optional<OccupancyMap> occupancy_;
 
-  FrameId last_decided_;                   // POSE has told of the frames up to this one whether they are keyframes
-  std::map<FrameId, CameraFrame> images_;  // of keyframes, and of frames that may become one
-  int64_t image_bytes_ = 0;
+  FrameId last_decided_;  // POSE has told of the frames up to this one whether they are keyframes
+  // Of keyframes, and of frames that may become one.
+  std::map<FrameId, WaitingImage<CameraFrame>> images_;
+  int64_t image_bytes_ = 0;                    // in memory
+  std::unique_ptr<ScratchFile> scratch_;       // null: there is none
   std::map<FrameId, KeyframeId> keyframe_at_;  // that the tracker sent
   std::set<FrameId> announced_;                // by POSE, and not yet sent
-  std::map<FrameId, ColorImage> colors_;       // that came; empty from when they are used
+  // That came; empty from when they are used.
+  std::map<FrameId, WaitingImage<ColorImage>> colors_;
   // Mono: keypoints of keyframes whose colors did not come yet, and the colors of keypoints.
   std::map<FrameId, std::vector<Keypoint>> uncolored_;
   std::map<KeyframeId, std::vector<Rgb>> keypoint_colors_;

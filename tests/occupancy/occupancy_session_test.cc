@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "support/depth_room.h"
 #include "support/map_changes.h"
 #include "support/matchers.h"
+#include "support/temporary_folder.h"
 
 namespace tessera {
 namespace {
@@ -219,6 +222,45 @@ TEST(OccupancySession, ImagesOfOtherFramesAreForgottenAndTheRestHasABound) {
   EXPECT_EQ(turn.session().num_waiting(), 2) << "known not to be one";
 }
 
+OccupancySessionOptions ColorOptions() {
+  OccupancySessionOptions options = SessionOptions();
+  options.with_color = true;
+  return options;
+}
+
+ColorFrame Painted(KeyframeId id) { return {.id = Turn::FrameOf(id), .image = Painted(Rgb{200, 100, 50})}; }
+
+// A stage that is far behind, in bounded memory: what waits on disk comes out as what waits in memory.
+TEST(OccupancySession, ImagesThatMemoryHasNoRoomForWaitOnDisk) {
+  const TemporaryFolder folder;
+  const int64_t image_bytes = 3 * int64_t{kDepthCamera.width_px} * kDepthCamera.height_px;
+  for (const bool has_disk : {true, false}) {
+    OccupancySessionOptions options = SessionOptions();
+    options.max_image_bytes = 2 * image_bytes;
+    options.with_color = true;
+    if (has_disk) options.scratch_dir = folder.path();
+    Turn turn(options);
+    for (int64_t i = 0; i < 9; ++i) turn.session().Receive(Painted({i}));
+    turn.SendAll(9);
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << "the file has no name";
+    turn.session().EndMap();
+    turn.WorkOff();
+    if (!has_disk) {
+      EXPECT_GT(turn.session().num_without_scan(), 5);
+      continue;
+    }
+    ASSERT_TRUE(turn.session().is_done());
+    OccupancySessionOptions roomy = SessionOptions();
+    roomy.with_color = true;
+    Turn in_memory(roomy);
+    for (int64_t i = 0; i < 9; ++i) in_memory.session().Receive(Painted({i}));
+    in_memory.SendAll(9);
+    in_memory.session().EndMap();
+    in_memory.WorkOff();
+    EXPECT_EQ(turn.session().occupancy()->ColorTreeFile(), in_memory.session().occupancy()->ColorTreeFile());
+  }
+}
+
 TEST(OccupancySession, MonoNeedsNoImages) {
   OccupancySession session({.map = {.resolution = 0.1, .max_range = 5.0}});
   Map map;
@@ -250,14 +292,6 @@ TEST(OccupancySession, SettingsThatDoNotFitTheSensorAreRefused) {
   keyframe.features.calibration = kDepthCamera;
   EXPECT_THAT(session.Receive(keyframe), IsFailure(testing::HasSubstr("maximum range")));
 }
-
-OccupancySessionOptions ColorOptions() {
-  OccupancySessionOptions options = SessionOptions();
-  options.with_color = true;
-  return options;
-}
-
-ColorFrame Painted(KeyframeId id) { return {.id = Turn::FrameOf(id), .image = Painted(Rgb{200, 100, 50})}; }
 
 TEST(OccupancySession, ScansWaitForTheirColors) {
   Turn turn(ColorOptions());

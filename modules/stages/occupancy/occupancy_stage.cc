@@ -23,6 +23,7 @@ OccupancySessionOptions OptionsFrom(const Settings& settings) {
                  .prob_min = occupancy.prob_min,
                  .prob_max = occupancy.prob_max};
   options.with_color = settings.Get<CameraSettings>().color;
+  options.scratch_dir = settings.Get<StreamTimingSettings>().journal_dir;
   options.max_disparity_px = settings.Get<FeaturesSettings>().max_disparity_px;
   return options;
 }
