@@ -12,6 +12,9 @@ Result<> LoopCloserOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(verification.Check());
   TESSERA_RETURN_IF_FAILED(correction.Check());
   if (!(max_contradiction_sigmas > 0.0)) return Failed("a loop must be allowed to contradict the map by something");
+  if (!(min_share_to_join >= 0.0 && min_share_to_join <= 1.0)) {
+    return Failed("min_share_to_join must be between 0 and 1");
+  }
   return relocalization.Check();
 }
 
@@ -44,6 +47,8 @@ LoopResult LoopCloser::FindLoop(KeyframeId id) const {
     result.num_matched += steps.is_matched ? 1 : 0;
     result.num_aligned += steps.is_aligned ? 1 : 0;
     if (!place) continue;
+    const bool joins_parts = RootOf(map_, id) != RootOf(map_, place->matched);
+    if (joins_parts && place->seen_share < options_.min_share_to_join) continue;
     std::optional<LoopCorrection> correction = ComputeCorrection(map_, id, *place, options_.correction);
     if (!correction) continue;
     if (correction->contradiction_sigmas > options_.max_contradiction_sigmas * place->seen_share) {
@@ -53,7 +58,7 @@ LoopResult LoopCloser::FindLoop(KeyframeId id) const {
     result.corrections = std::move(correction->keyframes);
     result.matched = place->matched;
     result.matched_from_current = place->matched_from_current;
-    result.joins_parts = RootOf(map_, id) != RootOf(map_, place->matched);
+    result.joins_parts = joins_parts;
     result.seen = std::move(place->seen);
     break;
   }

@@ -27,6 +27,8 @@ struct LoopCloserOptions {
   // 1500 standard deviations. Streets with the same cars parked at the same distances, 276 m and a right angle apart:
   // 5500.
   double max_contradiction_sigmas = 3000.0;
+  // Of a place in another part of the map: nothing is known between the two, so that nothing could contradict.
+  double min_share_to_join = 0.1;
 
   // Fails if a value is out of range.
   Result<> Check() const;

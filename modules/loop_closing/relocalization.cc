@@ -36,6 +36,7 @@ Result<> RelocalizationOptions::Check() const {
     return Failed("relocalization needs at least 4 matches and 6 observed landmarks");
   }
   if (!(min_coverage >= 0.0 && min_coverage <= 1.0)) return Failed("min_coverage must be between 0 and 1");
+  if (!(min_seen_share >= 0.0 && min_seen_share <= 1.0)) return Failed("min_seen_share must be between 0 and 1");
   return guided.Check();
 }
 
@@ -55,7 +56,8 @@ RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, con
     TrackedFrame frame(view);
     frame.world_from_camera = *pose;
     const KnownPoints landmarks = LandmarksAround(map, id, options.num_neighbors);
-    if (LocalizeAmong(landmarks, options.guided, {}, frame) < options.min_seen) continue;
+    const int num_seen = LocalizeAmong(landmarks, options.guided, {}, frame);
+    if (num_seen < options.min_seen || num_seen < options.min_seen_share * NumExpected(landmarks, frame)) continue;
     if (Coverage(landmarks, frame) < options.min_coverage) continue;
     answer.reference = id;
     answer.reference_from_camera = (keyframe.WorldFromKeyframe().Inverse() * frame.world_from_camera).Pose();

@@ -203,6 +203,29 @@ TEST(LoopCloser, RefusesAPlaceThatContradictsTheMap) {
   EXPECT_TRUE(allowed.matched.valid());
 }
 
+// Of two parts, nothing is known that could contradict: the place itself must show enough of what should be there.
+TEST(LoopCloser, AnotherPartAndALostCameraNeedMoreOfThePlace) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  PlantedMap planted(world);
+  PlantTwoVisits(planted, Away(1.0), [](FeatureFrame& features) {  // a part of the corners is new
+    for (size_t i = 0; i + 7 < features.keypoints.size(); i += 3) {
+      std::swap(features.descriptors[i], features.descriptors[i + 7 - i % 2]);
+    }
+  });
+  RelocalizationRequest request;
+  request.features = *planted.map().FindKeyframe({2 * kVisit - 1})->features;
+  for (const bool is_strict : {false, true}) {
+    LoopCloserOptions options;
+    if (is_strict) options.min_share_to_join = options.relocalization.min_seen_share = 1.0;
+    LoopCloser closer(ShippedVocabulary(), options), of_first(ShippedVocabulary(), options);
+    for (const MapDelta& delta : planted.deltas()) ASSERT_THAT(closer.ApplyDelta(delta), IsSuccess());
+    for (int64_t k = 0; k < kVisit; ++k)
+      ASSERT_THAT(of_first.ApplyDelta(planted.deltas()[static_cast<size_t>(k)]), IsSuccess());
+    EXPECT_EQ(closer.FindLoop({2 * kVisit - 1}).matched.valid(), !is_strict);
+    EXPECT_EQ(of_first.Relocalize(request).reference.valid(), !is_strict);
+  }
+}
+
 TEST(LoopCloser, NoLoopOnTheFirstVisitNorForAKeyframeThatIsGone) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
   PlantedMap planted(world);
