@@ -53,6 +53,8 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
     StreamReceiverOptions options = settings_.ReceiverOf(channel.bus);
     options.starts_now = channel.delivery == Delivery::kFromNow;
     options.discards_at_restart = true;  // a frame behind a missing one would be taken for the next
+    // A member of the run sends heartbeats, however late on a busy machine; a replayed log has none.
+    if (settings_.authenticator && !IsOpen(channel.name)) options.unwatched_us = options.give_up_us;
     subscription->receiver = std::make_unique<ChannelReceiver>(channel.name, options, std::move(sink));
   }
   if (!is_journaled || !journal_->is_replaying()) Open(*subscription);
@@ -97,9 +99,13 @@ void IncomingStreams::EndReplay() {
   }
 }
 
+bool IncomingStreams::IsOpen(const std::string& channel) const {
+  return !settings_.camera_is_member && IsSentByCameras(channel);
+}
+
 IncomingStreams::Sender IncomingStreams::SenderOf(const std::string& channel, ByteView message) const {
   if (!settings_.authenticator) return Sender::kMember;
-  const bool is_open = !settings_.camera_is_member && IsSentByCameras(channel);
+  const bool is_open = IsOpen(channel);
   if (is_open && channel != kEndOfStream.name) return Sender::kOutside;
   if (settings_.authenticator->Verify(settings_.channel_prefix + channel, message)) return Sender::kMember;
   return is_open ? Sender::kOutside : Sender::kStranger;

@@ -85,6 +85,8 @@ class IncomingStreams {
   void Open(Subscription& subscription);
   void WriteJournal(const std::string& channel, ByteView message, int64_t arrival_us);
   void OnMessage(Subscription& subscription, ByteView message, int64_t arrival_us);
+  // Whether a camera outside of the run may speak on the channel (without prefix).
+  bool IsOpen(const std::string& channel) const;
   // Who sent a message on the channel (without prefix). All are members where messages are not checked.
   Sender SenderOf(const std::string& channel, ByteView message) const;
   bool IsRepeated(Subscription& subscription, const MessageHeader& header) const;

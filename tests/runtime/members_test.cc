@@ -80,6 +80,19 @@ TEST_F(Members, RepairWhatIsLostWithItsTag) {
   EXPECT_EQ(status_.num_strangers, 0);
 }
 
+// A listener that was started again on a busy machine hears the sixth message first, and no heartbeat for a while: it
+// took the stream to begin there.
+TEST_F(Members, AreWaitedForWhereTheirHeartbeatsAreLate) {
+  const auto poses = bus_.AddContext("tracker").Advertise(kPose);
+  int num_poses = 0, num_heartbeats = 0;
+  bus_.LoseMessages([&](const std::string& channel) {
+    return (channel == "POSE" && num_poses++ < 5) || (channel == "HEARTBEAT" && num_heartbeats++ < 30);
+  });
+  for (int i = 0; i < 8; ++i) poses.Publish({.frame = {i}});
+  bus_.RunUntilQuiet(3.0);
+  EXPECT_EQ(poses_, (std::vector<int64_t>{0, 1, 2, 3, 4, 5, 6, 7}));
+}
+
 TEST_F(Members, PassOverWhoHasNoSecretOrAnother) {
   MakeRunDir(folder_, "other", std::string(64, '8'));
   const auto unsigned_poses = bus_.AddContext("tracker", 0, {"bus.run_dir="}).Advertise(kPose);
