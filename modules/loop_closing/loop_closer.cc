@@ -51,7 +51,7 @@ LoopResult LoopCloser::FindLoop(KeyframeId id) const {
     if (joins_parts && place->seen_share < options_.min_share_to_join) continue;
     std::optional<LoopCorrection> correction = ComputeCorrection(map_, id, *place, options_.correction);
     if (!correction) continue;
-    if (correction->contradiction_sigmas > options_.max_contradiction_sigmas * place->seen_share) {
+    if (!(correction->contradiction_sigmas <= options_.max_contradiction_sigmas * place->seen_share)) {
       ++result.num_contradicted;
       continue;
     }
