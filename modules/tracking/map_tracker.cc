@@ -18,6 +18,7 @@ namespace {
 constexpr double kMinShareWithMotion = 0.5;
 constexpr double kDriftInterval_s = 0.1;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
+constexpr double kLongLost_s = 2.0;      // since the last pose: the camera may be where nothing is known of
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
 constexpr double kOpenShare = 0.01;      // of a way from keyframe to keyframe: see IsWayOpen()
 constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
@@ -297,8 +298,9 @@ bool MapTracker::Localize(const Frame& view, FrameSearch& search) {
   const int num_matches = frame.NumPoints();
   const FramePose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < min_inliers) return false;
-  // After a loss the greater number of inliers says as much.
-  if (!lost_since_us_ && found->is_doubtful && Coverage(around, frame) < kMinCoverage) return false;
+  // Soon after a loss the greater number of inliers says as much.
+  const bool is_doubtful = lost_since_us_ ? SinceLast(*view) > kLongLost_s : found->is_doubtful;
+  if (is_doubtful && Coverage(around, frame) < kMinCoverage) return false;
   const bool are_few = pose.optimized.num_inliers < kFewInliers;
   if (!lost_since_us_ && are_few && search.PairContradicts(frame.world_from_camera)) return false;
   const int num_outliers = num_matches - frame.NumPoints();
@@ -417,8 +419,9 @@ bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation
 }
 
 // The frame that asked, this one or one before, becomes the last that was tracked. False if the answer does not hold in
-// this map.
+// this map, or comes when the camera has been found otherwise, or has begun another part, which a loop will join.
 bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& view) {
+  if (answer.frame != view->features().frame && state() == State::kTracking) return false;
   const Frame asked = view->features().frame == answer.frame ? view : asked_;
   const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(answer.reference);
   if (!world_from_reference || asked == nullptr || asked->features().frame != answer.frame) return false;

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
+#include <vector>
+
 #include "mapping/mapper.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
@@ -213,6 +217,72 @@ TEST(MapTracker, FindsItselfAgainAfterBlindFrames) {
   EXPECT_EQ(states[7], TrackingState::kLost);
   EXPECT_EQ(states[8], TrackingState::kTracked);
   EXPECT_EQ(states[11], TrackingState::kTracked);
+}
+
+// The picture's keypoints show what no map knows, but for those that `keep` chooses.
+void Scramble(FeatureFrame& features, const std::function<bool(size_t keypoint)>& keep) {
+  for (size_t i = 0; i < features.keypoints.size(); ++i) {
+    if (!keep(i)) features.descriptors[i][0] ^= ~uint64_t{0}, features.descriptors[i][2] ^= ~uint64_t{0};
+  }
+}
+
+// A tracker that begins with the map of a drive, live, while the loop closer is busy: its first image, of step 5, asks
+// where it is.
+class LateAnswer : public testing::Test {
+ protected:
+  void SetUp() override {
+    Outcome drive;
+    Follow(world_, 12, 3, {}, drive);
+    ASSERT_THAT(tracker_.ApplyDelta(drive.mapper.map().Snapshot()), IsSuccess());
+    const FeatureFrame first = world_.Take(0, world_.Pose(5.0)).features;
+    ASSERT_TRUE(tracker_.Track(first, nullptr, true).asks_relocalization);
+    ASSERT_EQ(tracker_.Track(first).pose.state, TrackingState::kLost);
+    answer_ = {first.frame, KeyframeId{0}, world_.Pose(0.0).Inverse() * world_.Pose(5.0), {}, 1};
+    drive.mapper.map().landmarks().ForEach([&](LandmarkId id, const Landmark& landmark) {
+      const Eigen::Vector3d in_camera = answer_.reference_from_camera.Inverse() * landmark.position_in_world;
+      const Eigen::Vector2d pixel = first.calibration.Project(in_camera);
+      for (size_t i = 0; in_camera.z() > 1.0 && i < first.keypoints.size(); ++i) {
+        const Eigen::Vector2d seen(first.keypoints[i].x_px, first.keypoints[i].y_px);
+        if ((seen - pixel).norm() < 1.0) answer_.seen.push_back({static_cast<int32_t>(i), id});
+      }
+    });
+  }
+  // At step 5, later.
+  FeatureFrame Take(int64_t frame) { return world_.Take(frame, world_.Pose(5.0)).features; }
+
+  SyntheticWorld world_{SensorType::kStereo, 0.3};
+  MapTracker tracker_{MapTrackerOptions{}};
+  RelocalizationAnswer answer_;
+};
+
+TEST_F(LateAnswer, IsFollowedSoonAfter) {
+  const PoseEstimate pose = tracker_.Track(Take(3), &answer_).pose;
+  EXPECT_TRUE(pose.is_relocalized);
+  EXPECT_EQ(pose.relocalized_by, answer_.frame);
+}
+
+// It would lead from where the camera was to what merely looks alike.
+TEST_F(LateAnswer, LeavesACameraAloneThatHasBegunAnotherPart) {
+  for (int64_t frame = 16; frame < 20; ++frame) {
+    FeatureFrame elsewhere = Take(frame);
+    Scramble(elsewhere, [](size_t /*keypoint*/) { return false; });
+    const MapTrackingResult result = tracker_.Track(elsewhere, frame == 18 ? &answer_ : nullptr);
+    EXPECT_EQ(result.pose.state, TrackingState::kTracked) << frame;
+    EXPECT_FALSE(result.pose.is_relocalized) << frame;
+    EXPECT_FALSE(result.pose.relocalized_by.valid()) << frame;
+  }
+}
+
+// One car of the old place stands where the camera is after three seconds: enough inliers, in a fifth of the image.
+TEST_F(LateAnswer, IsNotTakenForAnObjectThatIsSeenAgain) {
+  FeatureFrame elsewhere = Take(30);
+  const float end_px = 0.2F * static_cast<float>(elsewhere.calibration.width_px);
+  Scramble(elsewhere, [&](size_t keypoint) { return elsewhere.keypoints[keypoint].x_px < end_px; });
+  EXPECT_FALSE(tracker_.Track(elsewhere, &answer_).pose.is_relocalized);
+}
+
+TEST_F(LateAnswer, IsTakenWhereTheOldPlaceIsStillThere) {
+  EXPECT_TRUE(tracker_.Track(Take(30), &answer_).pose.is_relocalized);
 }
 
 }  // namespace
