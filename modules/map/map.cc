@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <initializer_list>
+#include <utility>
 
 #include "core/sha256.h"
 
@@ -139,7 +140,10 @@ Result<> Map::ApplyLists(const MapDelta& delta) {
   for (const auto& moved : delta.moved_keyframes) TESSERA_RETURN_IF_FAILED(MoveKeyframe(moved));
   for (const auto& changed : delta.changed_landmarks) TESSERA_RETURN_IF_FAILED(ChangeLandmark(changed));
   for (const auto& removed : delta.removed_observations) TESSERA_RETURN_IF_FAILED(RemoveObservation(removed));
-  for (const auto& added : delta.new_observations) TESSERA_RETURN_IF_FAILED(AddObservation(added));
+  for (const auto& added : delta.new_observations) {
+    TESSERA_RETURN_IF_FAILED(delta.is_snapshot ? Observe(added) : AddObservation(added));
+  }
+  if (delta.is_snapshot) CountAllShared();
   for (const auto& changed : delta.changed_parents) TESSERA_RETURN_IF_FAILED(ChangeParent(changed));
   for (const LandmarkId id : delta.removed_landmarks) TESSERA_RETURN_IF_FAILED(RemoveLandmark(id));
   for (const KeyframeId id : delta.removed_keyframes) TESSERA_RETURN_IF_FAILED(RemoveKeyframe(id));
@@ -215,6 +219,12 @@ Result<> Map::RemoveKeyframe(KeyframeId id) {
 }
 
 Result<> Map::AddObservation(const MapDelta::ChangedObservation& change) {
+  TESSERA_RETURN_IF_FAILED(Observe(change));
+  CountShared(change, 1);
+  return {};
+}
+
+Result<> Map::Observe(const MapDelta::ChangedObservation& change) {
   const auto& [landmark_id, observation] = change;
   Keyframe* keyframe = keyframes_.Find(observation.keyframe);
   ObservedLandmark* landmark = landmarks_.Find(landmark_id);
@@ -228,7 +238,6 @@ Result<> Map::AddObservation(const MapDelta::ChangedObservation& change) {
   if (next != others.end() && next->keyframe == observation.keyframe) {
     return Failed(Name(observation.keyframe) + " can't observe " + Name(landmark_id) + " twice");
   }
-  CountShared(observation.keyframe, *keyframe, others, 1);
   landmark->observations.Insert(others.data() + (next - others.begin()), observation);
   keyframe->landmarks[Index(observation.keypoint)] = landmark_id;
   hash_ += HashOf(change);
@@ -246,8 +255,8 @@ Result<> Map::RemoveObservation(const MapDelta::ChangedObservation& change) {
   if (keyframe == nullptr || landmark == nullptr || seen == landmark->observations.end()) {
     return Failed(Name(observation.keyframe) + " does not observe " + Name(landmark_id));
   }
+  CountShared(change, -1);
   landmark->observations.Remove(seen);
-  CountShared(observation.keyframe, *keyframe, landmark->observations.span(), -1);
   keyframe->landmarks[Index(observation.keypoint)] = LandmarkId{};
   hash_ -= HashOf(change);
   return {};
@@ -258,11 +267,39 @@ void Map::AddClosedLoop(const ClosedLoop& loop) {
   closed_loops_.push_back(loop);
 }
 
-// The keyframe came to see (1) or no longer sees (-1) a landmark that the others see.
-void Map::CountShared(KeyframeId id, Keyframe& keyframe, std::span<const Observation> others, int change) {
-  for (const Observation& other : others) {
-    ChangeCount(other.keyframe, change, keyframe.covisible);
-    ChangeCount(id, change, keyframes_.Find(other.keyframe)->covisible);
+// The keyframe has come to see a landmark (1), or no longer sees it soon (-1), which others see.
+void Map::CountShared(const MapDelta::ChangedObservation& change, int num) {
+  const KeyframeId id = change.observation.keyframe;
+  std::vector<CovisibleKeyframe>& covisible = keyframes_.Find(id)->covisible;
+  for (const Observation& other : landmarks_.Find(change.landmark)->observations) {
+    if (other.keyframe == id) continue;
+    ChangeCount(other.keyframe, num, covisible);
+    ChangeCount(id, num, keyframes_.Find(other.keyframe)->covisible);
+  }
+}
+
+// The same as counting each observation when it comes, in a fifth of the time for a large map. Each pair of keyframes
+// is counted once, at the lower id; so each list fills up by id.
+void Map::CountAllShared() {
+  std::vector<int32_t> num_shared(static_cast<size_t>(keyframes_.end_id()), 0);
+  const auto num = [&](KeyframeId id) -> int32_t& { return num_shared[static_cast<size_t>(id.value)]; };
+  std::vector<KeyframeId> higher;
+  for (KeyframeId id{0}; id.value < keyframes_.end_id(); ++id.value) {
+    Keyframe* keyframe = keyframes_.Find(id);
+    if (keyframe == nullptr) continue;
+    for (const LandmarkId landmark : keyframe->landmarks) {
+      const std::span<const Observation> observers = ObservationsOf(landmark);
+      for (auto other = observers.rbegin(); other != observers.rend() && other->keyframe > id; ++other) {
+        if (num(other->keyframe)++ == 0) higher.push_back(other->keyframe);
+      }
+    }
+    std::ranges::sort(higher);
+    for (const KeyframeId other : higher) {
+      const int32_t num_both = std::exchange(num(other), 0);
+      keyframe->covisible.push_back({other, num_both});
+      keyframes_.Find(other)->covisible.push_back({id, num_both});
+    }
+    higher.clear();
   }
 }
 

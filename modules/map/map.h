@@ -180,7 +180,9 @@ class Map {
   Result<> AddObservation(const MapDelta::ChangedObservation& change);
   Result<> RemoveObservation(const MapDelta::ChangedObservation& change);
   void AddClosedLoop(const ClosedLoop& loop);
-  void CountShared(KeyframeId id, Keyframe& keyframe, std::span<const Observation> others, int change);
+  Result<> Observe(const MapDelta::ChangedObservation& change);  // counts nothing
+  void CountShared(const MapDelta::ChangedObservation& change, int num);
+  void CountAllShared();
 
   IdMap<KeyframeId, Keyframe> keyframes_;
   IdMap<LandmarkId, ObservedLandmark> landmarks_;

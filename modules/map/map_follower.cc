@@ -32,6 +32,15 @@ void MapFollower::Receive(const MapSnapshotPage& page) {
   if (++collected_->next_page == collected_->num_pages) Complete();
 }
 
+const MapDelta* MapFollower::BegunSnapshot() const {
+  return collected_ && collected_->next_page == 1 ? &collected_->whole : nullptr;
+}
+
+void MapFollower::ReceiveRest(MapDelta whole) {
+  collected_->whole = std::move(whole);
+  Complete();
+}
+
 void MapFollower::Complete() {
   snapshot_ = std::make_shared<const MapDelta>(std::move(collected_->whole));
   collected_.reset();

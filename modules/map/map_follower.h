@@ -25,6 +25,10 @@ class MapFollower {
   // What came, in any order and any number of times.
   void Receive(Delta delta);
   void Receive(const MapSnapshotPage& page);
+  // The first page of a snapshot has come, and no other: who has the whole of it elsewhere need not wait for the rest.
+  const MapDelta* BegunSnapshot() const;
+  // That whole: its number and hash are those of BegunSnapshot().
+  void ReceiveRest(MapDelta whole);
   // The owner says that it has sent so many deltas.
   void Expect(int64_t num_deltas) { num_known_ = num_deltas; }
   // Takes out what can be applied next, in order; a snapshot may stand first.

@@ -4,6 +4,9 @@
 #include <memory>
 #include <utility>
 
+#include "core/errors.h"
+#include "wire/map_file.h"
+
 namespace tessera {
 namespace {
 
@@ -22,12 +25,27 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply a
   });
   context.Subscribe(kMapSnapshot, [this](const MapSnapshotPage& page) {
     follower_.Receive(page);
+    TakeRestFromFile();
     ApplyAll();
   });
   context.Every(kAskAgain, [this] {
     follower_.ForgetRequest();
     Ask();
   });
+}
+
+// A map of hundreds of megabytes comes sooner from the file that the mapper began with, where this node has it, than by
+// the bus. Another map's file has another hash, and one that can't be read is done without: the mapper tells of it.
+void MapSubscription::TakeRestFromFile() {
+  const MapDelta* begun = follower_.BegunSnapshot();
+  const std::string path = context_.settings().Get<MapperSettings>().load_map;
+  if (begun == nullptr || path.empty()) return;
+  try {
+    MapDelta whole = ReadMapFile(path);
+    if (whole.number == begun->number && whole.hash == begun->hash) follower_.ReceiveRest(std::move(whole));
+  } catch (const InputError&) {
+    return;
+  }
 }
 
 void MapSubscription::FollowToEnd() {

@@ -37,6 +37,7 @@ class MapSubscription {
   bool needs_snapshot() const { return follower_.needs_snapshot(); }
 
  private:
+  void TakeRestFromFile();
   void ApplyAll();
   void Ask();
 

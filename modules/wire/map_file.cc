@@ -1,5 +1,6 @@
 #include "wire/map_file.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/errors.h"
@@ -19,14 +20,9 @@ constexpr int32_t kVersion = 1;
 // The same map gives the same bytes: no clock in them.
 MessageHeader HeaderOf(int64_t sequence) { return {.publisher = kPublisher, .epoch_us = 1, .sequence = sequence}; }
 
-CameraCalibration CameraOf(const Map& map) {
-  CameraCalibration camera;
-  bool is_first = true;
-  map.keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
-    if (is_first) camera = keyframe.features->calibration;
-    is_first = false;
-  });
-  return camera;
+CameraCalibration CameraOf(const MapDelta& snapshot) {
+  const bool has_features = !snapshot.new_keyframes.empty() && snapshot.new_keyframes.front().features != nullptr;
+  return has_features ? snapshot.new_keyframes.front().features->calibration : CameraCalibration{};
 }
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& problem) {
@@ -72,9 +68,11 @@ bool BelongsTo(const MapSnapshotPage& page, const MapDelta& snapshot) {
 }
 
 // What the hash does not cover: that the file's parts speak of one and the same map.
-bool DoesFit(const MapFileHeader& header, const Map& map) {
-  return header.num_keyframes == map.keyframes().size() && header.num_landmarks == map.landmarks().size() &&
-         header.camera == CameraOf(map) && map.answered().value + 1 >= map.keyframes().end_id();
+bool DoesFit(const MapFileHeader& header, const MapDelta& snapshot) {
+  const auto is_answered = [&](const MapDelta::NewKeyframe& keyframe) { return keyframe.id <= snapshot.answers; };
+  return header.num_keyframes == static_cast<int64_t>(snapshot.new_keyframes.size()) &&
+         header.num_landmarks == static_cast<int64_t>(snapshot.changed_landmarks.size()) &&
+         header.camera == CameraOf(snapshot) && std::ranges::all_of(snapshot.new_keyframes, is_answered);
 }
 
 }  // namespace
@@ -83,7 +81,8 @@ void WriteMapFile(const Map& map, const std::string& path) {
   const MapDelta snapshot = map.Snapshot();
   const int32_t num_pages = NumSnapshotPages(snapshot);
   LogFileWriter file(path);
-  const MapFileHeader file_header{kVersion, num_pages, map.keyframes().size(), map.landmarks().size(), CameraOf(map)};
+  const MapFileHeader file_header{kVersion, num_pages, map.keyframes().size(), map.landmarks().size(),
+                                  CameraOf(snapshot)};
   file.Write(0, kHeaderChannel, EncodeValue(file_header, HeaderOf(0), kMaxMessageBytes).front());
   int64_t sequence = 1;
   for (int32_t page = 0; page < num_pages; ++page) {
@@ -117,9 +116,7 @@ MapDelta ReadMapFile(const std::string& path) {
     }
   }
   if (num_pages != header.num_pages) Refuse(path, "is cut off: copy it again, or make the map again");
-  Map trial;
-  if (const auto applied = trial.Apply(snapshot); !applied) Refuse(path, "is damaged: " + applied.error().sentence);
-  if (!DoesFit(header, trial)) Refuse(path, "is damaged: its beginning speaks of another map");
+  if (!DoesFit(header, snapshot)) Refuse(path, "is damaged: its beginning speaks of another map");
   return snapshot;
 }
 

@@ -50,7 +50,10 @@ void Read(std::string_view text) {
     }
     file.Close();
   }
-  ExpectSentence([] { (void)ReadMapFile(folder.path("map")); });
+  ExpectSentence([] {
+    Map map;
+    (void)map.Apply(ReadMapFile(folder.path("map")));
+  });
 }
 
 }  // namespace tessera

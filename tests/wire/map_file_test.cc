@@ -47,11 +47,13 @@ class MapFileTest : public testing::Test {
   }
   void WriteBytes(const std::string& bytes) const { std::ofstream(path_, std::ios::binary) << bytes; }
 
-  // What reading the file ends with: one sentence that names the file, or empty if it is a map.
+  // What reading and applying the file ends with: one sentence, which names the file if it can't be read; empty if it
+  // is a map.
   std::string Problem() const {
     try {
-      (void)ReadMapFile(path_);
-      return "";
+      Map read;
+      const Result<> applied = read.Apply(ReadMapFile(path_));
+      return applied ? "" : applied.error().sentence;
     } catch (const InputError& error) {
       const std::string sentence = error.what();
       EXPECT_TRUE(sentence.starts_with("map file " + path_)) << sentence;
