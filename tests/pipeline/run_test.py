@@ -225,6 +225,26 @@ def test_stages_that_are_killed_one_after_the_other_change_nothing(
     assert not (run.folder / "journal").exists()
 
 
+def test_killed_stages_of_a_lasting_map_begin_with_what_it_was_then(
+    tessera: Tessera, sequence: Path, tmp_path: Path
+) -> None:
+    """The map is saved all the time, and is another one when a stage is started again."""
+    lasting = tmp_path / "home.tessera"
+    tessera.run(f"kitti:{sequence}", "--map", lasting, "--frames", "0:30").must_end_well()
+    saved = lasting.read_bytes()
+    undisturbed = tessera.run(f"kitti:{sequence}", "--load-map", lasting).must_end_well()
+    run = KilledRun(tessera, sequence, "--map", lasting, "--pace", 0.5, "--set", "evaluator.save_period_s=0.2")
+    for number, stage in enumerate(("mapper", "tracker", "evaluator", "loop", "mapper")):
+        run.kill(stage, 38 + 4 * number)
+        assert lasting.read_bytes() != saved
+    status, out = run.end()
+    assert status == 0, out
+    summary = json.loads((run.folder / "summary.json").read_text())
+    for key in ("frames", "frames_tracked", "trajectory_sha256", "map_sha256"):
+        assert summary[key] == undisturbed.summary[key], key
+    assert (run.folder / "loaded.tessera").read_bytes() == saved
+
+
 def test_a_recorder_that_is_killed_continues_its_log(tessera: Tessera, sequence: Path, reference_run: Finished) -> None:
     """Also right after it was started again, and at the end."""
     run = KilledRun(tessera, sequence, "--record", "--pace", 0.5, history_bytes=64_000_000)

@@ -25,14 +25,16 @@ from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
 from tessera_cli.runs.ports import PortLock, take_free_port
 from tessera_cli.runs.run_folder import (
+    LOADED_MAP,
     Result,
     choose_folder,
+    keep_loaded_map,
     leave_journals,
     remove_earlier_run,
     remove_journals,
     require_no_run,
 )
-from tessera_cli.runs.run_settings import run_assignments
+from tessera_cli.runs.run_settings import loaded_map, run_assignments
 from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import (
     Present,
@@ -107,6 +109,7 @@ def _make_launcher(
     logs = LogFolder(folder / "stages", f"another run writes into {folder}: give another --out DIR.")
     if not arguments.force:
         require_no_run(folder)
+    assignments += _keep_loaded_map(arguments, folder)
     remove_earlier_run(folder)
     values = write_settings(assignments, folder / "settings.yaml")
     remove_journals(values)
@@ -116,6 +119,17 @@ def _make_launcher(
     processes = [_without_journal(process, values) for process in process_list.processes.values()]
     deputy = PrivateDeputy(logs, folder / "settings.yaml", processes)
     return Launcher(arguments, source, folder, values, deputy, present)
+
+
+def _keep_loaded_map(arguments: Namespace, folder: Path) -> list[str]:
+    """Raises UserError if it can't be kept."""
+    if not (path := loaded_map(arguments)):
+        (folder / LOADED_MAP).unlink(missing_ok=True)
+        return []
+    try:
+        return [f"mapper.load_map={keep_loaded_map(path, folder)}"]
+    except OSError as error:
+        raise UserError(f"the map {path} can't be copied into {folder}: {error.strerror}.") from error
 
 
 def _without_journal(process: Process, values: Settings) -> Process:
@@ -192,9 +206,10 @@ class Launcher:
                 self._stop()
         except (RunError, UserError) as failure:
             self._stop()
+            sentence = self._with_given_map(str(failure))
             if isinstance(failure, RunError) or self.has_poses:
-                self._try_to_summarize(self._wall_s(began), str(failure))
-            raise
+                self._try_to_summarize(self._wall_s(began), sentence)
+            raise type(failure)(sentence) from failure
         finally:
             self._deputy.kill()
         result = self._summarize(self._wall_s(began), ended)
@@ -205,6 +220,11 @@ class Launcher:
         said = result.summary["ended"]
         ended_well = said == "complete" or (said == "interrupted" and self._source.is_live)
         return 0 if ended_well and is_trustworthy(result.summary) else 1
+
+    def _with_given_map(self, sentence: str) -> str:
+        """Stages know the map that was loaded by its name in the run's folder; people by the one that they gave."""
+        given = loaded_map(self._arguments)
+        return sentence.replace(str(self._folder / LOADED_MAP), str(given)) if given else sentence
 
     def _why_nothing_was_located(self, num_frames: int) -> str:
         said = f"no pose was found for any of {num_frames} frames"

@@ -8,6 +8,7 @@ import datetime
 import json
 import os
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,7 @@ from tessera_cli.text import visible, visible_values
 
 TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d")
 SETTINGS_FILE = "settings.yaml"
+LOADED_MAP = "loaded.tessera"
 # What a run leaves; files of an earlier run in the same folder must not be taken for its own.
 RUN_FILES = (
     "summary.json",
@@ -90,6 +92,20 @@ def remove_earlier_run(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
     for log in (folder / "stages").glob("*.log*"):
         log.unlink()
+
+
+def keep_loaded_map(path: Path, folder: Path) -> Path:
+    """The map that the run begins with, under a name of its own in the run's folder: a stage that is started again
+    begins with the same one, also if the file (that of --map, each minute) has been replaced meanwhile."""
+    kept = folder / LOADED_MAP
+    if kept.exists() and kept.samefile(path):
+        return kept
+    kept.unlink(missing_ok=True)
+    try:
+        os.link(path, kept)
+    except OSError:  # on another disk, or one that has no links
+        shutil.copyfile(path, kept)
+    return kept
 
 
 def remove_journals(values: Settings) -> None:

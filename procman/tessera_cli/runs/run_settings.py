@@ -92,7 +92,7 @@ def map_path(name: str) -> Path:
 
 
 def _lasting_map(arguments: Namespace) -> list[str]:
-    """It is loaded if it exists, and saved at the end and every minute."""
+    """It is saved at the end and every minute."""
     if arguments.load_map or arguments.save_map:
         raise UserError("--map loads and saves one map: leave out --load-map and --save-map.")
     path = map_path(arguments.map)
@@ -100,9 +100,16 @@ def _lasting_map(arguments: Namespace) -> list[str]:
         path.parent.mkdir(parents=True, exist_ok=True)
     if not path.parent.is_dir():
         raise UserError(f"--map {arguments.map}: there is no folder {path.parent}.")
-    loads = [f"mapper.load_map={path}"] if path.is_file() else []
     saves = [f"evaluator.save_map={path}", f"evaluator.save_period_s={MAP_SAVE_PERIOD_S}"]
-    return loads + ([] if arguments.localize_only else saves)
+    return [] if arguments.localize_only else saves
+
+
+def loaded_map(arguments: Namespace) -> Path | None:
+    """The map that the run begins with; None if there is none yet. Raises UserError if --load-map names no file."""
+    if arguments.load_map:
+        return _existing_file("--load-map", arguments.load_map)
+    path = map_path(arguments.map) if arguments.map else None
+    return path if path and path.is_file() else None
 
 
 def _body_assignments(arguments: Namespace, source: Source) -> list[str]:
@@ -158,10 +165,9 @@ def _map_assignments(arguments: Namespace) -> list[str]:
         assignments.append("mapper.polish=true")
     if arguments.map:
         assignments += _lasting_map(arguments)
-    if arguments.load_map:
-        assignments.append(f"mapper.load_map={_existing_file('--load-map', arguments.load_map)}")
+    begins_with = loaded_map(arguments)
     if arguments.localize_only:
-        if not arguments.load_map and not (arguments.map and map_path(arguments.map).is_file()):
+        if not begins_with:
             raise UserError("--localize-only needs a map: give --load-map FILE, the map.tessera of an earlier run.")
         assignments.append("tracker.localize_only=true")
     if arguments.save_map:
