@@ -1,6 +1,7 @@
 #include "map/removed_keyframes.h"
 
 #include <set>
+#include <utility>
 
 namespace tessera {
 namespace {
@@ -18,25 +19,58 @@ std::optional<Sim3> FollowLinks(const Links& links, KeyframeId id, FindPose find
   }
 }
 
+using Parents = std::map<KeyframeId, KeyframeId>;  // by keyframe; invalid: of a root
+
+// The first keyframe of the root's tree that stays.
+KeyframeId HeirOf(KeyframeId root, const Parents& parents, const std::set<KeyframeId>& removed) {
+  for (const auto& [id, parent] : parents) {
+    KeyframeId ancestor = id;
+    for (auto next = parents.find(id); next != parents.end() && next->second.valid();) {
+      ancestor = next->second;
+      next = parents.find(ancestor);
+    }
+    if (ancestor == root && !removed.contains(id)) return id;
+  }
+  return {};
+}
+
+// To what the removed keyframe is linked. A root goes only if the same delta joins its part to another one: it has no
+// parent yet, and its tree hangs from another keyframe afterwards.
+template <class GetParents>
+KeyframeId ParentOrHeir(KeyframeId id, KeyframeId parent, const std::set<KeyframeId>& removed, GetParents parents) {
+  return parent.valid() ? parent : HeirOf(id, parents(), removed);
+}
+
+std::set<KeyframeId> RemovedBy(const MapDelta& delta, const Map& map) {
+  std::set<KeyframeId> removed(delta.removed_keyframes.begin(), delta.removed_keyframes.end());
+  if (!delta.is_snapshot) return removed;
+  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) { removed.insert(id); });
+  for (const MapDelta::NewKeyframe& keyframe : delta.new_keyframes) removed.erase(keyframe.id);
+  return removed;
+}
+
 }  // namespace
 
 void RemovedKeyframes::Remember(const Map& map, const MapDelta& delta) {
-  for (const KeyframeId id : delta.removed_keyframes) {
-    Remember(map, id);
+  const std::set<KeyframeId> removed = RemovedBy(delta, map);
+  for (const KeyframeId id : removed) {
+    const Keyframe* keyframe = map.FindKeyframe(id);
+    if (keyframe == nullptr) continue;
+    LinkTo(map, id, ParentOrHeir(id, keyframe->parent, removed, [&] {
+             Parents parents;
+             map.keyframes().ForEach([&](KeyframeId k, const Keyframe& other) { parents[k] = other.parent; });
+             return parents;
+           }));
   }
-  if (!delta.is_snapshot) return;
-  std::set<KeyframeId> kept;
-  for (const MapDelta::NewKeyframe& keyframe : delta.new_keyframes) kept.insert(keyframe.id);
-  map.keyframes().ForEach([&](KeyframeId id, const Keyframe&) {
-    if (!kept.contains(id)) Remember(map, id);
-  });
 }
 
 void RemovedKeyframes::Remember(const Map& map, KeyframeId id) {
-  const Keyframe* keyframe = map.FindKeyframe(id);
-  if (keyframe == nullptr) return;
-  if (const std::optional<Sim3> world_from_parent = Find(map, keyframe->parent)) {
-    links_[id] = {keyframe->parent, world_from_parent->Inverse() * keyframe->WorldFromKeyframe()};
+  if (const Keyframe* keyframe = map.FindKeyframe(id)) LinkTo(map, id, keyframe->parent);
+}
+
+void RemovedKeyframes::LinkTo(const Map& map, KeyframeId id, KeyframeId parent) {
+  if (const std::optional<Sim3> world_from_parent = Find(map, parent)) {
+    links_[id] = {parent, world_from_parent->Inverse() * map.FindKeyframe(id)->WorldFromKeyframe()};
   }
 }
 
@@ -69,7 +103,8 @@ void KeyframePoses::Begin(const Map& map) {
 
 RemovedInDelta KeyframePoses::Update(const MapDelta& delta, const Map& map) {
   RemovedInDelta removed{delta.number, {}};
-  for (const KeyframeId id : delta.removed_keyframes) Link(id, &removed);
+  const std::set<KeyframeId> ids(delta.removed_keyframes.begin(), delta.removed_keyframes.end());
+  for (const KeyframeId id : ids) Link(id, ids, &removed);
   for (const KeyframeId id : delta.removed_keyframes) poses_.erase(id);
   for (const auto& keyframe : delta.new_keyframes) Set(map, keyframe.id);
   for (const auto& moved : delta.moved_keyframes) Set(map, moved.id);
@@ -82,11 +117,16 @@ void KeyframePoses::Set(const Map& map, KeyframeId id) {
 }
 
 // As RemovedKeyframes::Remember does.
-void KeyframePoses::Link(KeyframeId id, RemovedInDelta* removed) {
+void KeyframePoses::Link(KeyframeId id, const std::set<KeyframeId>& all_removed, RemovedInDelta* removed) {
   const auto pose = poses_.find(id);
   if (pose == poses_.end()) return;
-  if (const std::optional<Sim3> world_from_parent = Find(pose->second.parent)) {
-    const KeyframeLink link{id, pose->second.parent, world_from_parent->Inverse() * pose->second.world_from_keyframe};
+  const KeyframeId parent = ParentOrHeir(id, pose->second.parent, all_removed, [&] {
+    Parents parents;
+    for (const auto& [keyframe, of_keyframe] : poses_) parents[keyframe] = of_keyframe.parent;
+    return parents;
+  });
+  if (const std::optional<Sim3> world_from_parent = Find(parent)) {
+    const KeyframeLink link{id, parent, world_from_parent->Inverse() * pose->second.world_from_keyframe};
     links_[id] = link;
     removed->links.push_back(link);
   }

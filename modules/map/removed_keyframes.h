@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "map/map.h"
@@ -27,8 +28,9 @@ struct RemovedInDelta {
 class RemovedKeyframes {
  public:
   // To be called with each delta before it is applied to `map`. Links removed keyframes to their parent, at its pose in
-  // the map then (a parent that is removed too, or was before, is followed to its own). A snapshot removes all that it
-  // does not hold.
+  // the map then (a parent that is removed too, or was before, is followed to its own); the root of a part that the
+  // same delta joins to another one, to a keyframe of the part that stays. A snapshot removes all that it does not
+  // hold.
   void Remember(const Map& map, const MapDelta& delta);
   // Links one keyframe of the map to its parent.
   void Remember(const Map& map, KeyframeId id);
@@ -46,6 +48,8 @@ class RemovedKeyframes {
     KeyframeId parent;
     Sim3 parent_from_keyframe;
   };
+  void LinkTo(const Map& map, KeyframeId id, KeyframeId parent);
+
   std::map<KeyframeId, Link> links_;
 };
 
@@ -64,7 +68,7 @@ class KeyframePoses {
     Sim3 world_from_keyframe;
   };
   void Set(const Map& map, KeyframeId id);
-  void Link(KeyframeId id, RemovedInDelta* removed);
+  void Link(KeyframeId id, const std::set<KeyframeId>& all_removed, RemovedInDelta* removed);
   std::optional<Sim3> Find(KeyframeId id) const;
 
   std::map<KeyframeId, Pose> poses_;

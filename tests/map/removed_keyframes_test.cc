@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "map/map_editor.h"
+#include "map/spanning_tree.h"
 #include "support/map_changes.h"
 #include "support/matchers.h"
 
@@ -115,6 +117,38 @@ TEST(RemovedKeyframes, OneThatCameLateIsToldTheSame) {
       EXPECT_EQ(a.translation, b.translation);
       EXPECT_EQ(a.rotation.coeffs(), b.rotation.coeffs());
     }
+  }
+}
+
+// One delta joins a part to the map and moves it there, and its first keyframes, of which the map shows as much, go.
+TEST(RemovedKeyframes, TheFirstKeyframeOfAPartGoesAlongWhenThePartIsJoined) {
+  Map map = Chain();
+  MapEditor begins(map);
+  for (int64_t id = 4; id < 8; ++id) {
+    begins.AddKeyframe({id}, id == 4 ? KeyframeId{} : KeyframeId{id - 1}, WorldFromKeyframe(id, 1.0),
+                       PlainFeatures(id, 1));
+  }
+  (void)begins.Finish({7});
+  Map followers_map = map;
+  KeyframePoses poses;
+  poses.Begin(map);
+
+  MapEditor joins(map);
+  for (int64_t id = 4; id < 8; ++id) joins.MoveKeyframe({id}, kCorrection * WorldFromKeyframe(id, 1.0));
+  AttachTree({7}, {2}, joins);
+  for (const int64_t id : {4, 5}) joins.RemoveKeyframe({id});
+  const MapDelta delta = joins.Finish({8});
+  RemovedKeyframes followed, told;
+  followed.Remember(followers_map, delta);
+  ASSERT_THAT(followers_map.Apply(delta), IsSuccess());
+  for (const KeyframeLink& link : poses.Update(delta, map).links) told.Add(link);
+  for (int64_t id = 4; id < 8; ++id) {
+    for (const RemovedKeyframes& removed : {followed, told}) {
+      ASSERT_TRUE(removed.Find(followers_map, {id}).has_value()) << id;
+      ExpectNear(*removed.Find(followers_map, {id}), kCorrection * WorldFromKeyframe(id, 1.0));
+    }
+    EXPECT_EQ(followed.Find(followers_map, {id})->translation, told.Find(map, {id})->translation);
+    EXPECT_EQ(followed.Successor(followers_map, {id}), KeyframeId{std::max<int64_t>(id, 6)});
   }
 }
 
