@@ -135,7 +135,8 @@ int64_t LogReader::Impl::NumFramesSent() {
     ValueJoiner<EndOfStream> joiner;
     const auto header = ReadHeader(event.data);
     const Result<const EndOfStream*> end = joiner.Add(event.data, *header);
-    if (end && *end != nullptr) return std::max(num_frames, (*end)->num_frames);
+    // A camera begins with any frame of its source (num_values: see EndOfStream).
+    if (end && *end != nullptr) return std::max(num_frames, (*end)->num_frames - (*end)->num_values);
   }
   const std::vector<Place>& places = streams[2].places;
   const auto last = std::find_if(places.rbegin(), places.rend(), [](const Place& place) { return place.part == 0; });

@@ -45,14 +45,14 @@ class LogTest : public testing::Test {
       ++next_[publisher + channel.name];
     }
   }
-  // What a camera sends.
-  void AddRecording() {
+  // What a camera sends that begins with this frame of its source.
+  void AddRecording(int first_frame = 0) {
     std::mt19937 generator(1);
     calibration_ = DrawValue<CameraCalibration>(generator, 1);
     Add(kCalibration, calibration_);
     for (int i = 0; i < kNumFrames; ++i) {
       CameraFrame frame = DrawValue<CameraFrame>(generator, 1);
-      frame.id = {i};
+      frame.id = {first_frame + i};
       frame.utime_us = time_us_ = 50'000 * i;
       GroundTruthPose truth = DrawValue<GroundTruthPose>(generator, 1);
       truth.frame = frame.id;
@@ -60,8 +60,9 @@ class LogTest : public testing::Test {
       Add(kCamera, frame);
       frames_.push_back(frame);
     }
-    Add(kEndOfStream, EndOfStream{.stage = StageKind::kCamera, .num_frames = kNumFrames});
-    Add(kEndOfStream, EndOfStream{.stage = StageKind::kDispatcher, .num_frames = kNumFrames}, "dispatcher");
+    const EndOfStream end{.num_frames = first_frame + kNumFrames, .num_values = first_frame};
+    Add(kEndOfStream, end);
+    Add(kEndOfStream, EndOfStream{.stage = StageKind::kDispatcher, .num_frames = end.num_frames}, "dispatcher");
   }
   std::string Write(Checksums checksums = Checksums::kNone) {
     LogFileWriter writer(Path("log"), checksums);
@@ -167,6 +168,13 @@ TEST_F(LogTest, CutAnywhereIsRefusedWithItsName) {
     std::filesystem::resize_file(Path("cut"), generator() % (size - 400));
     EXPECT_NE(Refusal(Path("cut")).find(Path("cut")), std::string::npos);
   }
+}
+
+TEST_F(LogTest, OfTheMiddleOfASourceLacksNothing) {
+  AddRecording(1000);
+  const std::string path = Write();
+  EXPECT_EQ(LogReader(path).loss(), "");
+  ExpectWhole(path);
 }
 
 TEST_F(LogTest, LackingMessagesItIsUsedAsFarAsItGoes) {
