@@ -85,6 +85,8 @@ def _summary(loops: bool) -> dict[str, Any]:
         "messages_of_strangers": 0,
         "trajectory_sha256": "ab" * 32,
         "map_sha256": "cd" * 32,
+        "rms_error_m": 0.02,
+        "alignment": "SE(3) over 117 frames",
         "relocalizations": 2,
         "loops_closed": int(loops),
         "wall_s": 2.8,
@@ -93,5 +95,6 @@ def _summary(loops: bool) -> dict[str, Any]:
         "max_rss_mb": dict.fromkeys(PROCESSES, 70.0),
         "extractor_restarts": 0,
         "warnings": [],
+        "not_written": [],
         "versions": {"Tessera": "0123456789ab", "LCM": "1.5.3"},
     }

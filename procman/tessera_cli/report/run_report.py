@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tessera_cli.report.html_report import write_report
-from tessera_cli.report.sentences import headline, remarks, strangers_sentence
+from tessera_cli.report.sentences import headline, parts_sentences, remarks, strangers_sentence
 from tessera_cli.report.terminal_plot import draw_from_above
 from tessera_cli.report.trajectory_plot import plot_trajectory
 from tessera_cli.runs.run_folder import Result, Summary
@@ -82,7 +82,8 @@ def _lines(summary: Summary) -> list[str]:
     )
     if strangers := summary.get("messages_of_strangers"):
         lines.append(strangers_sentence(strangers))
-    return lines + [f"warning: {warning}" for warning in summary["warnings"] + summary["not_written"]]
+    warnings = parts_sentences(summary) + summary["warnings"] + summary["not_written"]
+    return lines + [f"warning: {warning}" for warning in warnings]
 
 
 def _describe_loop_checks(summary: Summary) -> str:

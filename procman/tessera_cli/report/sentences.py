@@ -107,7 +107,7 @@ def remarks(result: Result) -> list[str]:
         found.append("The run was interrupted before its source ended; all figures are of the frames until then.")
     elif ended != "complete":
         found.append(f"The run failed: {ended}")
-    found += _lost(result) + _parts(summary)
+    found += _lost(result) + parts_sentences(summary)
     if (wait := summary.get("map_wait_ms")) and wait["p95"] >= NOTABLE_WAIT_MS:
         found.append(
             f"The tracker waited for the mapper {wait['mean']:.1f} ms a frame on average, and {wait['p95']:.0f} ms or "
@@ -132,7 +132,8 @@ def _lost(result: Result) -> list[str]:
     return [f"{count(len(numbers), 'frame')} got no pose: {', '.join(ranges[:MAX_RANGES])}{more}."]
 
 
-def _parts(summary: Summary) -> list[str]:
+def parts_sentences(summary: Summary) -> list[str]:
+    """Empty if the map is in one piece."""
     parts = summary.get("parts") or []
     if len(parts) < 2:
         return []
