@@ -4,58 +4,13 @@
 #include <array>
 #include <limits>
 #include <set>
-#include <span>
+#include <utility>
 #include <vector>
 
 namespace tessera {
 namespace {
 
 constexpr uint8_t kUnknownLevel = 255, kNoLevel = 254;
-
-// Who may stand in for a keyframe.
-struct Others {
-  int last_visit = 0;  // those of later ones don't count
-  int min_observers = 1;
-  double share = 1.0;  // of the landmarks must be observed by so many
-};
-
-// Whether `is_well_observed` holds for more than this share of the keyframe's landmarks. It is given the landmark and
-// the level at which the keyframe observes it.
-template <class IsWellObserved>
-bool HoldsForMost(const Keyframe& keyframe, double share, IsWellObserved is_well_observed) {
-  const auto num_landmarks = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(),
-                                           [](LandmarkId landmark) { return landmark.valid(); });
-  const double min_well_observed = share * static_cast<double>(num_landmarks);
-  auto num_well_observed = num_landmarks;  // an upper bound until the loop ends
-  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
-    const LandmarkId landmark = keyframe.landmarks[i];
-    if (!landmark.valid()) continue;
-    num_well_observed -= is_well_observed(landmark, keyframe.features->keypoints[i].level) ? 0 : 1;
-    if (static_cast<double>(num_well_observed) <= min_well_observed) return false;  // most, after a few landmarks
-  }
-  return num_landmarks > 0;
-}
-
-// Whether enough other keyframes observe the landmark at the scale of `own` or a finer one.
-bool IsWellObserved(const Map& map, const Visits& visits, LandmarkId landmark, KeyframeId own, int level,
-                    const Others& others) {
-  const std::span<const Observation> observations = map.ObservationsOf(landmark);
-  if (observations.size() <= static_cast<size_t>(others.min_observers)) return false;
-  int num_observers = 0;
-  for (const Observation& observation : observations) {
-    if (observation.keyframe == own || visits.Of(observation.keyframe) > others.last_visit) continue;
-    const Keyframe& other = *map.FindKeyframe(observation.keyframe);
-    num_observers += other.features->keypoints[Index(observation.keypoint)].level <= level + 1 ? 1 : 0;
-    if (num_observers >= others.min_observers) return true;
-  }
-  return false;
-}
-
-bool CanStandIn(const Map& map, const Visits& visits, const Others& others, KeyframeId id) {
-  return HoldsForMost(*map.FindKeyframe(id), others.share, [&](LandmarkId landmark, int level) {
-    return IsWellObserved(map, visits, landmark, id, level, others);
-  });
-}
 
 // Whether the keyframes around `id` are one group by what they share with one another.
 bool NeighborsHoldWithout(const Map& map, KeyframeId id, int min_tie) {
@@ -109,14 +64,15 @@ int Visits::Of(KeyframeId id) const {
   return static_cast<int>(std::upper_bound(begins_.begin(), begins_.end(), id) - begins_.begin());
 }
 
-int ObserverLevels::Of(const Map& map, LandmarkId id) {
+int ObserverLevels::Of(const Map& map, const Visits& visits, LandmarkId id) {
   const auto index = static_cast<size_t>(id.value);
   if (index >= levels_.size()) levels_.resize(static_cast<size_t>(map.landmarks().end_id()), kUnknownLevel);
   uint8_t& level = levels_[index];
   if (level != kUnknownLevel) return level;
   std::array<int, std::numeric_limits<uint8_t>::max() + 1> num_at{};
-  for (const Observation& observation : map.ObservationsOf(id)) {
-    ++num_at[map.FindKeyframe(observation.keyframe)->features->keypoints[Index(observation.keypoint)].level];
+  for (const auto& [keyframe, keypoint] : map.ObservationsOf(id)) {
+    if (visits.Of(keyframe) > last_visit_) continue;
+    ++num_at[map.FindKeyframe(keyframe)->features->keypoints[Index(keypoint)].level];
   }
   int num_observers = 0;
   for (level = 0; level < kNoLevel; ++level) {
@@ -131,14 +87,12 @@ void ObserverLevels::Forget(LandmarkId id) {
   if (index < levels_.size()) levels_[index] = kUnknownLevel;
 }
 
-// A keyframe is an observer itself.
-KeyframeCuller::KeyframeCuller(const KeyframeCullingOptions& options)
-    : options_(options), levels_(options.redundant_observers + 1) {}
+KeyframeCuller::KeyframeCuller(const KeyframeCullingOptions& options) : options_(options) {}
 
 void KeyframeCuller::Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor) {
   const Map& map = editor.map();
   visits_.Update(map, center);
-  for (const LandmarkId id : editor.reobserved_landmarks().Ids()) levels_.Forget(id);
+  for (const LandmarkId id : editor.reobserved_landmarks().Ids()) Forget(id);
   const std::set<KeyframeId> closed_a_loop = KeyframesOfLoops(map);
   for (const KeyframeId id : map.Covisible(center, std::numeric_limits<int>::max())) {
     const bool must_stay = closed_a_loop.contains(id) || !map.FindKeyframe(id)->parent.valid();
@@ -149,21 +103,40 @@ void KeyframeCuller::Cull(KeyframeId center, RemovedKeyframes& removed, MapEdito
 
 bool KeyframeCuller::IsRedundant(const Map& map, KeyframeId id) {
   const int visit = visits_.Of(id);
-  const bool can_others_stand_in =
-      visit == visits_.newest()
-          ? HoldsForMost(*map.FindKeyframe(id), options_.redundant_share,
-                         [&](LandmarkId landmark, int level) { return levels_.Of(map, landmark) <= level + 1; })
-          : CanStandIn(map, visits_, {visit, options_.redundant_observers, options_.redundant_share}, id);
-  if (can_others_stand_in) return true;
-  return visit > 0 && CanStandIn(map, visits_, {visit - 1, 1, options_.known_share}, id) &&
+  // It is an observer of its landmarks itself.
+  if (AreObserved(map, id, options_.redundant_share, options_.redundant_observers + 1, visit)) return true;
+  return visit > 0 && AreObserved(map, id, options_.known_share, 1, visit - 1) &&
          NeighborsHoldWithout(map, id, options_.min_tie);
+}
+
+// Whether so many keyframes of the first visits observe more than this share of the keyframe's landmarks, at its level
+// or a finer one.
+bool KeyframeCuller::AreObserved(const Map& map, KeyframeId id, double share, int num_observers, int last_visit) {
+  const auto key = std::pair(num_observers, last_visit);
+  ObserverLevels& levels = levels_.try_emplace(key, num_observers, last_visit).first->second;
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  const auto num_landmarks = std::ranges::count_if(keyframe.landmarks, &LandmarkId::valid);
+  const double min_observed = share * static_cast<double>(num_landmarks);
+  auto num_observed = num_landmarks;  // an upper bound until the loop ends
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    const LandmarkId landmark = keyframe.landmarks[i];
+    if (!landmark.valid()) continue;
+    const int level = keyframe.features->keypoints[i].level;
+    num_observed -= levels.Of(map, visits_, landmark) <= level + 1 ? 0 : 1;
+    if (static_cast<double>(num_observed) <= min_observed) return false;  // most, after a few landmarks
+  }
+  return num_landmarks > 0;
+}
+
+void KeyframeCuller::Forget(LandmarkId id) {
+  for (auto& [key, levels] : levels_) levels.Forget(id);
 }
 
 void KeyframeCuller::Remove(KeyframeId id, RemovedKeyframes& removed, MapEditor& editor) {
   const Map& map = editor.map();
   const Keyframe& keyframe = *map.FindKeyframe(id);
   for (const LandmarkId landmark : keyframe.landmarks) {
-    if (landmark.valid()) levels_.Forget(landmark);
+    if (landmark.valid()) Forget(landmark);
   }
   const KeyframeId parent = keyframe.parent;
   map.keyframes().ForEach([&](KeyframeId child, const Keyframe& other) {

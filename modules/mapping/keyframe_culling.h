@@ -8,6 +8,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "core/result.h"
@@ -44,18 +46,19 @@ class Visits {
   FrameId last_frame_;
 };
 
-// By landmark: the n-th finest pyramid level at which a keyframe observes it. On a long straight road a keyframe shares
-// far points with hundreds of others, which all look at their landmarks at each step: asked of the map, half of the
-// mapper's time after 4 km.
+// By landmark: the n-th finest pyramid level at which a keyframe of the first visits, up to `last_visit`, observes it.
+// On a long straight road a keyframe shares far points with hundreds of others, which all look at their landmarks at
+// each step: asked of the map, half of the mapper's time after 4 km.
 class ObserverLevels {
  public:
-  explicit ObserverLevels(int n) : n_(n) {}
-  // Higher than any level if there are fewer observers.
-  int Of(const Map& map, LandmarkId id);
+  ObserverLevels(int n, int last_visit) : n_(n), last_visit_(last_visit) {}
+  // Higher than any level if there are fewer such observers.
+  int Of(const Map& map, const Visits& visits, LandmarkId id);
   void Forget(LandmarkId id);
 
  private:
   int n_;
+  int last_visit_;
   std::vector<uint8_t> levels_;  // by landmark id
 };
 
@@ -71,11 +74,13 @@ class KeyframeCuller {
 
  private:
   bool IsRedundant(const Map& map, KeyframeId id);
+  bool AreObserved(const Map& map, KeyframeId id, double share, int num_observers, int last_visit);
+  void Forget(LandmarkId id);
   void Remove(KeyframeId id, RemovedKeyframes& removed, MapEditor& editor);
 
   KeyframeCullingOptions options_;
   Visits visits_;
-  ObserverLevels levels_;
+  std::map<std::pair<int, int>, ObserverLevels> levels_;  // by number of observers and last visit
 };
 
 }  // namespace tessera
