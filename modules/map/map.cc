@@ -334,6 +334,12 @@ MapDelta Map::Snapshot() const {
   delta.answers = answered_;
   delta.is_snapshot = true;
   delta.hash = hash_;
+  size_t num_observations = 0;
+  landmarks_.ForEach(
+      [&](LandmarkId, const ObservedLandmark& landmark) { num_observations += landmark.observations.span().size(); });
+  delta.new_keyframes.reserve(static_cast<size_t>(keyframes_.size()));
+  delta.changed_landmarks.reserve(static_cast<size_t>(landmarks_.size()));
+  delta.new_observations.reserve(num_observations);
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& keyframe) {
     delta.new_keyframes.push_back({id, keyframe.parent, keyframe.world_from_camera, keyframe.features, keyframe.scale});
   });
