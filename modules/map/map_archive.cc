@@ -27,13 +27,18 @@ MapArchive::Answer MapArchive::AnswerTo(const MapRequest& request, const Map& ma
     const auto has_number = [&](const MapDelta& snapshot) { return snapshot.number == request.snapshot; };
     const auto held = std::find_if(snapshots_.begin(), snapshots_.end(), has_number);
     // One that is gone is replaced by a newer one, from its beginning.
-    const bool is_there = held != snapshots_.end() && request.page >= 0 && request.page < NumSnapshotPages(*held);
-    answer.page = is_there ? CutSnapshotPage(*held, request.page) : CutSnapshotPage(snapshots_.front(), 0);
+    const int32_t num_pages = held == snapshots_.end() ? 0 : NumSnapshotPages(*held);
+    if (request.page < 0 || request.page >= num_pages) {
+      answer.pages.push_back(CutSnapshotPage(snapshots_.front(), 0));
+      return answer;
+    }
+    const int32_t end = std::min(num_pages, request.page + MapRequest::kMaxPages);
+    for (int32_t page = request.page; page < end; ++page) answer.pages.push_back(CutSnapshotPage(*held, page));
     return answer;
   }
   const int64_t first_kept = deltas_.empty() ? map.next_delta() : deltas_.front()->number;
   if (request.next_delta < first_kept || request.next_delta > map.next_delta()) {
-    answer.page = CutSnapshotPage(snapshots_.front(), 0);
+    answer.pages.push_back(CutSnapshotPage(snapshots_.front(), 0));
     return answer;
   }
   for (const auto& delta : deltas_) {

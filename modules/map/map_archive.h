@@ -18,7 +18,7 @@ class MapArchive {
  public:
   struct Answer {
     std::vector<std::shared_ptr<const MapDelta>> deltas;  // to be sent again, in order
-    std::optional<MapSnapshotPage> page;
+    std::vector<MapSnapshotPage> pages;                   // in order
   };
 
   // The owner began with this map.

@@ -11,11 +11,13 @@ namespace tessera {
 // A follower lacks something. Asking twice does no harm.
 struct MapRequest {
   int64_t next_delta = -1;  // it has all deltas below this number; -1: it has none that it could build on
-  int64_t snapshot = -1;    // a page of the snapshot with this number is asked for; -1: whatever leads on
-  int32_t page = 0;
+  int64_t snapshot = -1;    // pages of the snapshot with this number are asked for; -1: whatever leads on
+  int32_t page = 0;         // the first of them
 
-  // Sent for one request; who lacks more asks again.
+  // Sent for one request; who lacks more asks again. A page at a time, a large map would come at the pace of questions
+  // and answers; more of them at once than a receive buffer holds would be lost.
   static constexpr int64_t kMaxDeltas = 16;
+  static constexpr int32_t kMaxPages = 8;
 
   bool operator==(const MapRequest&) const = default;
 };

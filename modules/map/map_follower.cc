@@ -69,11 +69,14 @@ std::optional<MapRequest> MapFollower::Request() const {
   return std::nullopt;
 }
 
-// While the deltas of one answer come in, one after the other, the next one is missing each time; each request for it
+// While what answers a request comes in, one after the other, the next one is missing each time; each request for it
 // would be answered by many.
 bool MapFollower::IsAnsweredSoon(const MapRequest& request) const {
   if (!asked_) return false;
   if (request == *asked_) return true;
+  const int32_t num_pages_come = request.page - asked_->page;
+  const bool are_pages = request.snapshot >= 0 && request.snapshot == asked_->snapshot;
+  if (are_pages) return num_pages_come > 0 && num_pages_come < MapRequest::kMaxPages;
   const bool are_deltas = request.snapshot < 0 && asked_->snapshot < 0 && asked_->next_delta >= 0;
   const int64_t num_come = request.next_delta - asked_->next_delta;
   return are_deltas && num_come > 0 && num_come < MapRequest::kMaxDeltas;

@@ -75,7 +75,7 @@ MapperActions MapperSession::Receive(const MapRequest& request) {
   MapArchive::Answer answer = archive_.AnswerTo(request, map());
   MapperActions actions;
   for (auto& delta : answer.deltas) actions.emplace_back(std::move(delta));
-  if (answer.page) actions.emplace_back(std::move(*answer.page));
+  for (auto& page : answer.pages) actions.emplace_back(std::move(page));
   return actions;
 }
 

@@ -34,9 +34,9 @@ class Owner {
   MapArchive::Answer AnswerTo(const MapRequest& request) { return archive_.AnswerTo(request, map_); }
   void Answer(const MapRequest& request, MapFollower& follower) {
     const MapArchive::Answer answer = AnswerTo(request);
-    num_pages_ += answer.page ? 1 : 0;
+    num_pages_ += static_cast<int>(answer.pages.size());
     for (const auto& delta : answer.deltas) follower.Receive(delta);
-    if (answer.page) follower.Receive(*answer.page);
+    for (const MapSnapshotPage& page : answer.pages) follower.Receive(page);
   }
   const Map& map() const { return map_; }
   int num_pages() const { return num_pages_; }
@@ -137,6 +137,53 @@ TEST(MapFollower, AsksForALostTailWhenToldOfIt) {
   EXPECT_THAT(Update(follower, replica), IsSuccess());
   EXPECT_FALSE(follower.Request());
   ExpectEqual(replica, owner.map());
+}
+
+// A page at a time, a large map would come at the pace of questions and answers.
+TEST(MapFollower, PagesComeSeveralForEachQuestion) {
+  Owner owner(3);
+  for (int i = 0; i < 150; ++i) owner.Next();
+  MapFollower follower(true);
+  Map replica;
+  int num_questions = 0, num_pages = 0;
+  while (const std::optional<MapRequest> request = follower.TakeRequest()) {
+    ASSERT_LT(++num_questions, 100);
+    for (const MapSnapshotPage& page : owner.AnswerTo(*request).pages) {
+      EXPECT_EQ(page.page, num_pages++);
+      if (num_pages % MapRequest::kMaxPages != 1) {
+        EXPECT_FALSE(follower.TakeRequest().has_value()) << "the page is on its way";
+      }
+      follower.Receive(page);
+    }
+    if (!follower.BegunSnapshot() && follower.next_delta() > 0) break;
+  }
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
+  EXPECT_GT(num_pages, 2 * MapRequest::kMaxPages);
+  EXPECT_EQ(num_questions, 1 + (num_pages - 1 + MapRequest::kMaxPages - 1) / MapRequest::kMaxPages);
+}
+
+// Whoever has the snapshot elsewhere is done with its first page.
+TEST(MapFollower, TakesTheRestOfASnapshotFromElsewhere) {
+  Owner owner(3);
+  for (int i = 0; i < 100; ++i) owner.Next();
+  MapFollower follower(true);
+  EXPECT_EQ(follower.BegunSnapshot(), nullptr);
+  const MapSnapshotPage first = owner.AnswerTo(*follower.Request()).pages.front();
+  ASSERT_GT(first.num_pages, 2);
+  follower.Receive(first);
+  ASSERT_NE(follower.BegunSnapshot(), nullptr);
+  EXPECT_EQ(follower.BegunSnapshot()->hash, first.part.hash);
+  MapDelta whole;
+  for (int32_t page = 0; page < first.num_pages; ++page) {
+    const MapArchive::Answer answer = owner.AnswerTo({.snapshot = first.part.number, .page = page});
+    if (page == 0) whole = answer.pages.front().part;
+    if (page > 0) AppendPage(answer.pages.front(), &whole);
+  }
+  follower.ReceiveRest(whole);
+  EXPECT_EQ(follower.BegunSnapshot(), nullptr);
+  Map replica;
+  EXPECT_THAT(Update(follower, replica), IsSuccess());
+  EXPECT_EQ(replica.next_delta(), first.part.number + 1);
 }
 
 // Joins after `num_before` deltas; the owner goes on between any two answers.
@@ -290,15 +337,15 @@ TEST(MapArchive, SeveralFollowersMayReadDifferentSnapshots) {
 // Who begins with the base snapshot finds all that the mapper may still wait for in the deltas since: it repeats
 // everything that another one did on the map as it was then.
 void ExpectOldBaseWithAllDeltasSince(Owner& owner, int64_t num_since_begin) {
-  const std::optional<MapSnapshotPage> page = owner.AnswerTo({}).page;
-  ASSERT_TRUE(page.has_value());
+  const std::vector<MapSnapshotPage> pages = owner.AnswerTo({}).pages;
+  ASSERT_THAT(pages, testing::SizeIs(1));
   const int64_t next = owner.map().next_delta();
-  const int64_t age = next - 1 - page->part.number;
+  const int64_t age = next - 1 - pages[0].part.number;
   EXPECT_GE(age, std::min(num_since_begin, MapArchive::kSnapshotInterval)) << next;
   EXPECT_LE(age, 2 * MapArchive::kSnapshotInterval) << next;
-  for (int64_t number = page->part.number + 1; number < next;) {
+  for (int64_t number = pages[0].part.number + 1; number < next;) {
     const MapArchive::Answer answer = owner.AnswerTo({.next_delta = number});
-    ASSERT_FALSE(answer.page.has_value()) << "delta " << number << " of " << next << " is gone";
+    ASSERT_THAT(answer.pages, testing::IsEmpty()) << "delta " << number << " of " << next << " is gone";
     ASSERT_FALSE(answer.deltas.empty());
     for (const auto& delta : answer.deltas) EXPECT_EQ(delta->number, number++);
   }
@@ -316,11 +363,11 @@ TEST(MapArchive, TheBaseSnapshotIsOlderThanWhatIsAwaited) {
   Owner owner(12);
   for (int64_t i = 0; i < 60; ++i) owner.Next();
   for (int64_t i = 0; i < 300; ++i) owner.Next(60);
-  const std::optional<MapSnapshotPage> page = owner.AnswerTo({}).page;
-  ASSERT_TRUE(page.has_value());
-  EXPECT_LT(page->part.number, 60);
-  EXPECT_GE(page->part.number, 60 - 2 * MapArchive::kSnapshotInterval);
-  EXPECT_FALSE(owner.AnswerTo({.next_delta = 60}).page.has_value()) << "the awaited delta itself is gone";
+  const std::vector<MapSnapshotPage> pages = owner.AnswerTo({}).pages;
+  ASSERT_THAT(pages, testing::SizeIs(1));
+  EXPECT_LT(pages[0].part.number, 60);
+  EXPECT_GE(pages[0].part.number, 60 - 2 * MapArchive::kSnapshotInterval);
+  EXPECT_THAT(owner.AnswerTo({.next_delta = 60}).pages, testing::IsEmpty()) << "the awaited delta itself is gone";
   for (int64_t i = 0; i < MapArchive::kSnapshotInterval; ++i) owner.Next();
   ExpectOldBaseWithAllDeltasSince(owner, 300);
 }
@@ -329,8 +376,8 @@ TEST(MapArchive, BeginsWithALoadedMap) {
   for (const int num_loaded : {1, 46, 60}) {
     Owner owner(11, num_loaded);
     const MapArchive::Answer answer = owner.AnswerTo({.next_delta = 0});
-    ASSERT_TRUE(answer.page.has_value()) << "nobody has the deltas that made it";
-    EXPECT_EQ(answer.page->part.number, num_loaded - 1);
+    ASSERT_THAT(answer.pages, testing::SizeIs(1)) << "nobody has the deltas that made it";
+    EXPECT_EQ(answer.pages[0].part.number, num_loaded - 1);
     for (int64_t i = 1; i < 120; ++i) {
       owner.Next();
       ExpectOldBaseWithAllDeltasSince(owner, i);

@@ -12,6 +12,8 @@ namespace {
 // Many followers that build the map anew at once are answered; a flood of requests does not keep it from its work.
 constexpr double kAnswersPerSecond = 300;
 constexpr double kAnswersAtOnce = 50;
+// Who has not heard an answer asks again after three times as long (map_subscription.cc).
+constexpr int64_t kAnswerHolds_us = 100000;
 
 MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
   MapperSessionOptions options;
@@ -45,13 +47,22 @@ MapperStage::MapperStage(StageContext& context)
   Receive(kGlobalAdjustment);
   context.Subscribe(kMapRequest, [this](const MapRequest& request, const MessageInfo& info) {
     // By the time of arrival, which is the same when the journal is replayed.
-    if (answering_.Take(1, info.arrival_us)) Do(session_.Receive(request));
+    if (IsAnswered(request, info.arrival_us) || !answering_.Take(1, info.arrival_us)) return;
+    answered_ = {request, info.arrival_us};
+    Do(session_.Receive(request));
   });
   context.Subscribe(kEndOfStream, [this](const EndOfStream& end) {
     if (end.stage != StageKind::kTracker) return;
     Do(session_.Receive(end));
     Advance();
   });
+}
+
+// All followers hear the pages that one of them asked for.
+bool MapperStage::IsAnswered(const MapRequest& request, int64_t arrival_us) const {
+  const MapRequest& answered = answered_.request;
+  return request.snapshot >= 0 && request.snapshot == answered.snapshot && request.page == answered.page &&
+         arrival_us - answered_.arrival_us < kAnswerHolds_us;
 }
 
 template <class Value>

@@ -16,11 +16,18 @@ class MapperStage {
  private:
   template <class Value>
   void Receive(const Topic<Value>& topic);
+  bool IsAnswered(const MapRequest& request, int64_t arrival_us) const;
   void Advance();
   void Do(const MapperActions& actions);
 
+  struct Answered {
+    MapRequest request;
+    int64_t arrival_us = 0;
+  };
+
   StageContext& context_;
   RateLimit answering_;  // requests of followers, who ask again
+  Answered answered_;    // the last one
   MapperSession session_;
   Publisher<MapDelta> deltas_;
   Publisher<MapSnapshotPage> pages_;

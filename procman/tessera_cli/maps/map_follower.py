@@ -12,8 +12,8 @@ from tessera_cli.maps.map_replica import MapError, MapReplica
 
 # Deltas kept behind a gap; more are dropped, and asked for when the gap is closed.
 MAX_WAITING = 256
-# Deltas that the mapper sends for one request (modules/map/map_exchange.h).
-MAX_ANSWERED = 16
+# Deltas and pages that the mapper sends for one request (modules/map/map_exchange.h).
+MAX_DELTAS, MAX_PAGES = 16, 8
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,12 @@ class Request:
     page: int = 0
 
     def is_answered_with(self, asked: "Request") -> bool:
-        """Whether the answer to `asked` holds this too: while its deltas come in, the next one is missing each time."""
-        are_deltas = self.snapshot < 0 and asked.snapshot < 0
-        return self == asked or (are_deltas and 0 < self.next_delta - asked.next_delta < MAX_ANSWERED)
+        """Whether the answer to `asked` holds this too: while it comes in, the next part of it is missing each time."""
+        if self == asked:
+            return True
+        if self.snapshot >= 0 or asked.snapshot >= 0:
+            return self.snapshot == asked.snapshot and 0 < self.page - asked.page < MAX_PAGES
+        return 0 < self.next_delta - asked.next_delta < MAX_DELTAS
 
 
 class PartJoiner:
@@ -73,9 +76,11 @@ class MapFollower:
     def on_delta(self, message: Any) -> bool:
         """A map_delta_t. Returns whether the replica changed."""
         parts = self._joiner.add(("delta", message.number), message)
-        if parts is None or message.number < self.next_delta or len(self._waiting) >= MAX_WAITING:
+        if parts is None or message.number < self.next_delta:
             return False
         self._waiting.setdefault(message.number, parts)
+        if len(self._waiting) > MAX_WAITING:  # not the first: the one that closes the gap must always find room
+            del self._waiting[max(self._waiting)]
         return self._apply_waiting()
 
     def on_page(self, message: Any) -> bool:

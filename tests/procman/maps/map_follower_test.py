@@ -1,7 +1,7 @@
 """A listener follows the map from any moment on, whatever is lost on the way."""
 
 from helpers.made_map import make_change, make_delta, make_landmark, make_page, two_views
-from tessera_cli.maps.map_follower import MapFollower, Request
+from tessera_cli.maps.map_follower import MAX_DELTAS, MAX_PAGES, MAX_WAITING, MapFollower, Request
 
 
 def landmark_delta(number: int, part: int = 0, num_parts: int = 1) -> object:
@@ -38,6 +38,28 @@ def test_what_follows_a_gap_waits_for_it() -> None:
     assert follower.on_delta(landmark_delta(1))
     assert ids_of(follower) == [100, 110, 120]
     assert follower.request() is None
+
+
+def test_a_gap_is_closed_however_much_came_behind_it() -> None:
+    follower = MapFollower()
+    last = MAX_WAITING + 20
+    for number in range(3, last):
+        follower.on_delta(landmark_delta(number))
+    for number in range(3):
+        follower.on_delta(landmark_delta(number))
+    assert follower.request() is None and follower.next_delta == MAX_WAITING + 2, "the last ones are to be told again"
+    for number in range(follower.next_delta, last):
+        follower.on_delta(landmark_delta(number))
+    assert follower.next_delta == last
+
+
+def test_what_an_answer_holds_is_asked_for_once() -> None:
+    pages, deltas = Request(0, snapshot=40, page=1), Request(7)
+    assert Request(0, 40, MAX_PAGES).is_answered_with(pages)
+    assert not Request(0, 40, 1 + MAX_PAGES).is_answered_with(pages)
+    assert not Request(0, 41, 2).is_answered_with(pages), "of another snapshot"
+    assert Request(6 + MAX_DELTAS).is_answered_with(deltas)
+    assert not Request(7 + MAX_DELTAS).is_answered_with(deltas)
 
 
 def test_a_late_listener_gets_the_map_page_by_page() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from helpers.made_map import make_camera, make_change, make_delta, set_header, two_views
-from tessera_cli.maps.map_follower import MAX_ANSWERED
+from tessera_cli.maps.map_follower import MAX_DELTAS
 from tessera_cli.messages import decode, header_t, map_request_t, occupancy_request_t
 from tessera_cli.messages import message_types as tessera
 from tessera_cli.viewing import scene, view_bus
@@ -97,7 +97,7 @@ def test_deltas_of_one_answer_are_asked_for_once() -> None:
     bus, sink = FakeBus(), FakeSink()
     listener = make_listener(bus, sink)
     listener._ask_for_map(100.0)
-    follower, num_answered = listener._scene.follower, MAX_ANSWERED
+    follower, num_answered = listener._scene.follower, MAX_DELTAS
     follower.on_delta(make_delta(0, two_views()))
     follower.on_delta(make_delta(num_answered + 3, make_change()))  # newer than the answer
     for number in range(1, num_answered):
