@@ -509,7 +509,9 @@ std::optional<MapTracker::Drift> MapTracker::DriftNow() const {
 // Whether the loss has lasted so long that a new part of the map should begin.
 bool MapTracker::NoteLoss(int64_t utime_us) {
   if (!lost_since_us_) lost_since_us_ = utime_us;
-  if (utime_us - *lost_since_us_ <= options_.max_lost_us || !options_.makes_keyframes) return false;
+  const int64_t max_unlocated_us = tracked_utime_us_ ? 0 : options_.max_unlocated_us;
+  const int64_t max_lost_us = std::max(options_.max_lost_us, max_unlocated_us);
+  if (utime_us - *lost_since_us_ <= max_lost_us || !options_.makes_keyframes) return false;
   if (last_) {
     world_from_start_ = last_->frame.world_from_camera;
     drift_ = DriftNow();

@@ -38,6 +38,7 @@ struct MapTrackerOptions {
   double min_share_of_last = 0.1;    // of the last frame's points: fewer from one frame to the next are there by chance
   int min_relocalized_inliers = 50;  // likewise after a loss, where chance has more room
   int64_t max_lost_us = 1500000;     // after so long without a pose, a new part of the map begins
+  int64_t max_unlocated_us = 0;      // the same before the first pose in a map that was loaded, if that is longer
   bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
   int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
   double max_depth_baselines = 40.0;  // stereo, RGB-D: up to here a keypoint's depth makes a point at once

@@ -233,7 +233,8 @@ class LateAnswer : public testing::Test {
   void SetUp() override {
     Outcome drive;
     Follow(world_, 12, 3, {}, drive);
-    ASSERT_THAT(tracker_.ApplyDelta(drive.mapper.map().Snapshot()), IsSuccess());
+    snapshot_ = drive.mapper.map().Snapshot();
+    ASSERT_THAT(tracker_.ApplyDelta(snapshot_), IsSuccess());
     const FeatureFrame first = world_.Take(0, world_.Pose(5.0)).features;
     ASSERT_TRUE(tracker_.Track(first, nullptr, true).asks_relocalization);
     ASSERT_EQ(tracker_.Track(first).pose.state, TrackingState::kLost);
@@ -251,6 +252,7 @@ class LateAnswer : public testing::Test {
   FeatureFrame Take(int64_t frame) { return world_.Take(frame, world_.Pose(5.0)).features; }
 
   SyntheticWorld world_{SensorType::kStereo, 0.3};
+  MapDelta snapshot_;
   MapTracker tracker_{MapTrackerOptions{}};
   RelocalizationAnswer answer_;
 };
@@ -259,6 +261,18 @@ TEST_F(LateAnswer, IsFollowedSoonAfter) {
   const PoseEstimate pose = tracker_.Track(Take(3), &answer_).pose;
   EXPECT_TRUE(pose.is_relocalized);
   EXPECT_EQ(pose.relocalized_by, answer_.frame);
+}
+
+// Before the first pose in a map that was loaded, it is waited for longer.
+TEST_F(LateAnswer, IsWaitedForBeforeTheFirstPose) {
+  MapTracker tracker({.max_unlocated_us = 3000000});
+  ASSERT_THAT(tracker.ApplyDelta(snapshot_), IsSuccess());
+  for (const int64_t frame : {0, 16, 30, 31}) {
+    FeatureFrame elsewhere = Take(frame);
+    Scramble(elsewhere, [](size_t /*keypoint*/) { return false; });
+    const TrackingState state = tracker.Track(elsewhere).pose.state;
+    EXPECT_EQ(state, frame <= 30 ? TrackingState::kLost : TrackingState::kTracked) << frame;
+  }
 }
 
 // It would lead from where the camera was to what merely looks alike.
