@@ -23,6 +23,8 @@ constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair
 constexpr double kOpenShare = 0.01;      // of a way from keyframe to keyframe: see IsWayOpen()
 constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
+// Where depth is measured, no scale can slip, and a hand jerks: what moves the image by less than this is no doubt.
+constexpr double kMinDoubtfulShift_px = 10.0;
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
 
@@ -158,7 +160,7 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
   result.pose.reference_from_camera = last_->reference_from_camera;
   if (result.pose.num_inliers == 0) CountPoints(result.pose);  // a map begins: its first points
   result.pose.is_keyframe = !result.keyframes.empty();
-  result.pose.is_step_doubtful = last_->evidence == StepEvidence::kContradictory;
+  result.pose.is_step_doubtful = last_->is_doubtful;
   result.pose.scale_sigma = scale_.RecentDrift(result.pose.utime_us);
   result.pose.body = DescribeBody();
   tracked_utime_us_ = result.pose.utime_us;
@@ -451,6 +453,7 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   const Sim3 reference_from_world = WorldFromReference().Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
+  const bool is_doubtful = pose.evidence == StepEvidence::kContradictory && IsDoubtful(frame, reference_from_camera);
   // After a step that contradicts it, nothing is known of how the camera moves: it may have been carried away.
   const Eigen::Matrix3d covariance =
       TranslationCovariance(pose.optimized.information) * reference_from_world.scale * reference_from_world.scale;
@@ -468,6 +471,16 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   const std::optional<Matrix6d> pose_covariance = CovarianceFromReference(frame, influences);
   last_.emplace(Last{std::move(frame), reference_from_camera, pose.evidence, covariance, mean_motion, is_wide_step,
                      std::move(influences), pose_covariance});
+  last_->is_doubtful = is_doubtful;
+}
+
+// Of a step that contradicts the motion of a moment ago: whether it may be wrong by much.
+bool MapTracker::IsDoubtful(const TrackedFrame& frame, const Rigid3& reference_from_camera) const {
+  const std::optional<MotionPrediction> motion = PredictMotion(*frame.view);
+  if (frame.view->baseline_m() == 0.0 || !motion) return true;
+  const Rigid3 last_from_current = last_->reference_from_camera.Inverse() * reference_from_camera;
+  const double difference = (last_from_current.translation - motion->last_from_current.translation).norm();
+  return frame.view->calibration().fx_px * difference > kMinDoubtfulShift_px * frame.MedianDepth();
 }
 
 // Both ends of the way are as uncertain as their own frames' points leave them.

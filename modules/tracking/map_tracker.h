@@ -95,6 +95,7 @@ class MapTracker {
     std::optional<PoseInfluences> influences = std::nullopt;
     std::optional<Matrix6d> pose_covariance = std::nullopt;  // of the way from the reference to here
     int num_outliers = 0;                                    // points that were matched and contradict the pose
+    bool is_doubtful = false;                                // PoseEstimate::is_step_doubtful
   };
 
   // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
@@ -134,6 +135,7 @@ class MapTracker {
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
   std::optional<PosePrior> PriorOf(const MotionPrediction& motion) const;
+  bool IsDoubtful(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
   bool IsWayOpen(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
   MotionPrior ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const;
   void ResetMotion();

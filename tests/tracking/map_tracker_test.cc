@@ -219,6 +219,24 @@ TEST(MapTracker, FindsItselfAgainAfterBlindFrames) {
   EXPECT_EQ(states[11], TrackingState::kTracked);
 }
 
+// A camera that suddenly goes half as far as a moment before. Where depth is measured, a jerk by few pixels is none.
+TEST(MapTracker, AStepThatContradictsTheMotionIsDoubtfulIfItShowsInTheImage) {
+  for (const double step_length : {1.0, 0.2}) {
+    SyntheticWorld world(SensorType::kStereo, 0.3);
+    MapTracker tracker{MapTrackerOptions{}};
+    Mapper mapper{MapperOptions{}};
+    for (int64_t step = 0; step < 15; ++step) {
+      const double at = static_cast<double>(step) - (step >= 12 ? 0.5 : 0.0);
+      const MapTrackingResult result = tracker.Track(world.Take(step, world.Pose(step_length * at)).features);
+      EXPECT_EQ(result.pose.state, TrackingState::kTracked);
+      EXPECT_EQ(result.pose.is_step_doubtful, step == 12 && step_length == 1.0) << step << ", " << step_length;
+      for (const KeyframeObservation& keyframe : result.keyframes) {
+        ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+      }
+    }
+  }
+}
+
 // The picture's keypoints show what no map knows, but for those that `keep` chooses.
 void Scramble(FeatureFrame& features, const std::function<bool(size_t keypoint)>& keep) {
   for (size_t i = 0; i < features.keypoints.size(); ++i) {
