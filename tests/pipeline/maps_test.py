@@ -143,6 +143,8 @@ def test_a_map_lasts_over_runs_and_a_loss_of_power(tessera: Tessera, sequence: P
     words = ("--map", lasting, "--pace", "0.3", "--set", "evaluator.save_period_s=0.2")
     second = tessera.start("run", f"kitti:{sequence}", *words, "--port", tessera.next_port(), "--out", folder)
     wait_for(lambda: lasting.read_bytes() != saved, "a newer map")
+    for option in ("--map", "--save-map"):
+        tessera.run(f"kitti:{sequence}", option, lasting).must_refuse(str(lasting), "is kept by another run")
     second.kill()  # the guard kills its stages
     second.wait()
     third = tessera.run(f"kitti:{sequence}", "--map", lasting, "--localize-only").must_end_well()

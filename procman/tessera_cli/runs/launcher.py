@@ -3,6 +3,7 @@
 What the stack consists of, the order in which it starts and what is restarted is defined by procman/local.pmd.
 """
 
+import hashlib
 import shutil
 import time
 from argparse import Namespace
@@ -23,6 +24,7 @@ from tessera_cli.files import PROCMAN
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.membership import RunDir, draw_secret, pool_secret, secret_of
 from tessera_cli.runs.live_view import RunView, make_run_view
+from tessera_cli.runs.locks import RunLock
 from tessera_cli.runs.ports import PortLock, take_free_port
 from tessera_cli.runs.run_folder import (
     LOADED_MAP,
@@ -34,7 +36,7 @@ from tessera_cli.runs.run_folder import (
     remove_journals,
     require_no_run,
 )
-from tessera_cli.runs.run_settings import loaded_map, run_assignments
+from tessera_cli.runs.run_settings import loaded_map, run_assignments, saved_map
 from tessera_cli.runs.sources import Source, parse_source
 from tessera_cli.runs.summary import (
     Present,
@@ -65,7 +67,7 @@ def run_stack(arguments: Namespace, present: Present) -> int:
     source = parse_source(arguments.source)
     folder = choose_folder(arguments.out, source)
     is_new = not folder.exists()
-    lock = _choose_port(arguments, source)
+    locks = [_lock_saved_map(arguments), _choose_port(arguments, source)]
     launcher: Launcher | None = None
     cleanup = ExitStack()
     try:
@@ -82,7 +84,20 @@ def run_stack(arguments: Namespace, present: Present) -> int:
         raise
     finally:
         cleanup.close()
-        del lock
+        del locks
+
+
+def _lock_saved_map(arguments: Namespace) -> RunLock | None:
+    """Two runs that save one map would each lose what the other has learned."""
+    if not (path := saved_map(arguments)):
+        return None
+    try:
+        return RunLock(f"map-{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:40]}")
+    except OSError as error:
+        raise UserError(
+            f"the map {path} is kept by another run: end that one first, or begin with the map by --load-map "
+            "and save another."
+        ) from error
 
 
 def _choose_port(arguments: Namespace, source: Source) -> PortLock | None:

@@ -1,11 +1,11 @@
 """Which base port a run takes, so that a second one on the same machine does not disturb the first."""
 
-import socket
 from collections.abc import Iterator
 
 from tessera_cli.constants import DEFAULT_PORT, FREE_BUS_S, HEARTBEAT
 from tessera_cli.errors import RunError
 from tessera_cli.lcm_bus import Bus, bus_url, listen
+from tessera_cli.runs.locks import RunLock
 
 # From one stack's ports to the next: its buses, and a port for each extractor that there may be.
 STEP = 300
@@ -13,20 +13,12 @@ STEP = 300
 NUM_TRIED = 20
 
 
-class PortLock:
-    """Held by a run as long as it lives; the kernel frees it, however the run ends.
-
-    An address without a file, which only processes of this machine (and network namespace) see, as the bus itself.
-    """
+class PortLock(RunLock):
+    """A network namespace has buses and locks of its own."""
 
     def __init__(self, port: int, channel_prefix: str) -> None:
         """Raises OSError if another run holds it."""
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind(f"\0tessera-run-{port}-{channel_prefix}")
-        except OSError:
-            self._socket.close()
-            raise
+        super().__init__(f"run-{port}-{channel_prefix}")
 
 
 def take_free_port(channel_prefix: str) -> tuple[int, PortLock]:

@@ -104,6 +104,13 @@ def _lasting_map(arguments: Namespace) -> list[str]:
     return [] if arguments.localize_only else saves
 
 
+def saved_map(arguments: Namespace) -> Path | None:
+    """The map that the run writes besides that in its folder."""
+    if arguments.map and not arguments.localize_only:
+        return map_path(arguments.map)
+    return absolute(arguments.save_map) if arguments.save_map else None
+
+
 def loaded_map(arguments: Namespace) -> Path | None:
     """The map that the run begins with; None if there is none yet. Raises UserError if --load-map names no file."""
     if arguments.load_map:
