@@ -22,8 +22,8 @@ struct MapFileHeader {
 // Writes beside, then renames. Throws InputError if it can't be written.
 void WriteMapFile(const Map& map, const std::string& path);
 
-// The snapshot in the file. Throws InputError with one sentence: no such file, no map file, of another version, cut off,
-// damaged. Whether its content is what was written, Map::Apply tells by the hash.
+// The snapshot in the file. Throws InputError with one sentence: no such file, no map file, of another version, cut
+// off, damaged. Whether its content is what was written, Map::Apply tells by the hash.
 MapDelta ReadMapFile(const std::string& path);
 
 }  // namespace tessera
