@@ -56,6 +56,15 @@ Polyline RoundCorners(const Polyline& line, double corner_m) {
   return smooth;
 }
 
+// The way's first `length_m`; 0: all of it. Throws InputError if it is shorter.
+Polyline Begin(Polyline way, double length_m) {
+  if (length_m > LengthOf(way) + 1.0) {
+    throw InputError("sim: the way through this world is " + std::to_string(static_cast<int>(LengthOf(way))) +
+                     " m long: give a length of at most that");
+  }
+  return Shorten(std::move(way), length_m);
+}
+
 StreetPlan PlanWalk(const std::vector<Crossing>& walk, uint32_t seed, double length_m) {
   StreetPlan plan;
   Polyline corners;
@@ -107,19 +116,27 @@ Polyline CornersOfStroll(const std::vector<Crossing>& walk, uint32_t seed) {
 
 }  // namespace
 
+// Of a longer drive: the same round again, which ends with the streets with which it begins.
 StreetPlan PlanTown(uint32_t seed, double length_m) {
-  return PlanWalk({{0, 0}, {0, 1}, {0, 2}, {1, 2}, {1, 1}, {2, 1}, {2, 2}, {3, 2}, {3, 3}, {2, 3},
-                   {1, 3}, {1, 2}, {0, 2}, {0, 1}, {1, 1}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {4, 1},
-                   {3, 1}, {3, 2}, {2, 2}, {2, 1}, {2, 0}, {1, 0}, {0, 0}, {0, 1}, {0, 2}, {1, 2}},
-                  seed, length_m);
+  constexpr size_t kNumCommon = 4;
+  const std::vector<Crossing> round{{0, 0}, {0, 1}, {0, 2}, {1, 2}, {1, 1}, {2, 1}, {2, 2}, {3, 2}, {3, 3}, {2, 3},
+                                    {1, 3}, {1, 2}, {0, 2}, {0, 1}, {1, 1}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {4, 1},
+                                    {3, 1}, {3, 2}, {2, 2}, {2, 1}, {2, 0}, {1, 0}, {0, 0}, {0, 1}, {0, 2}, {1, 2}};
+  std::vector<Crossing> walk = round;
+  StreetPlan plan = PlanWalk(walk, seed, length_m);
+  while (LengthOf(plan.drive) < length_m) {
+    walk.insert(walk.end(), round.begin() + kNumCommon, round.end());
+    plan = PlanWalk(walk, seed, length_m);
+  }
+  return plan;
 }
 
 StreetPlan PlanRound(uint32_t seed, double length_m) {
-  StreetPlan plan = PlanWalk({{0, 0}, {0, 1}, {1, 1}, {1, 0}, {0, 0}, {0, 1}}, seed, length_m);
+  StreetPlan plan = PlanWalk({{0, 0}, {0, 1}, {1, 1}, {1, 0}, {0, 0}, {0, 1}}, seed, 0.0);
   // The round, and about 40 m of it again.
   const Polyline round = {CrossingPoint({0, 0}, seed), CrossingPoint({0, 1}, seed), CrossingPoint({1, 1}, seed),
                           CrossingPoint({1, 0}, seed), CrossingPoint({0, 0}, seed)};
-  plan.drive = Shorten(std::move(plan.drive), LengthOf(round) + 40.0);
+  plan.drive = Begin(Shorten(std::move(plan.drive), LengthOf(round) + 40.0), length_m);
   return plan;
 }
 
@@ -130,7 +147,7 @@ StreetPlan PlanStroll(uint32_t seed, double length_m) {
   for (const Eigen::Vector2d& p : Resample(RoundCorners(CornersOfStroll(walk, seed), 3.0), kStepM)) {
     way.push_back(Bend(p, seed));
   }
-  plan.drive = Shorten(std::move(way), length_m);
+  plan.drive = Begin(std::move(way), length_m);
   plan.gap_m = 0.8;
   plan.has_traffic = false;
   return plan;
@@ -152,7 +169,7 @@ StreetPlan PlanFromPoses(const std::string& path, double length_m) {
   if (way.size() < 2) throw InputError(path + " holds no drive: fewer than two positions");
   if (!(LengthOf(way) <= kMaxDriveM)) throw InputError(path + " holds a drive of more than 50 km");
   StreetPlan plan;
-  plan.drive = Shorten(Resample(way, kStepM), length_m);
+  plan.drive = Begin(Resample(way, kStepM), length_m);
   // A street is built where the drive comes for the first time.
   Polyline street;
   const Polyline posts = Resample(plan.drive, 4.0);

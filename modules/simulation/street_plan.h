@@ -18,7 +18,8 @@ struct StreetPlan {
 };
 
 // A walk over the crossings of a small town of bent streets, with several revisits in the same lane and in the other.
-// Only the first `length_m` of the drive are driven; 0: all of it.
+// The first `length_m` of the drive are driven; 0: all of it. Of this one, 2.5 km long, the same streets again where
+// more is asked for; the others throw InputError then.
 StreetPlan PlanTown(uint32_t seed, double length_m);
 // One round of blocks that overlaps its beginning by some 40 m.
 StreetPlan PlanRound(uint32_t seed, double length_m);

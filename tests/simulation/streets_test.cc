@@ -1,6 +1,8 @@
 // Streets as polylines, and the drive along them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/errors.h"
 #include "simulation/drive.h"
 #include "simulation/street_map.h"
@@ -64,6 +66,23 @@ TEST(PlanTown, DrivesOnStreetsAndStopsAtTheLengthAskedFor) {
   const StreetMap map(plan.streets);
   for (const Eigen::Vector2d& point : plan.drive) EXPECT_LT(map.DistanceToStreet(point), kRoadHalfWidthM + 3.0);
   EXPECT_NE(LengthOf(PlanTown(5, 0.0).drive), LengthOf(PlanTown(4, 0.0).drive));
+}
+
+TEST(PlanTown, ALongerDriveGoesTheSameWayAgain) {
+  const StreetPlan once = PlanTown(4, 0.0), longer = PlanTown(4, 6000.0);
+  EXPECT_NEAR(LengthOf(longer.drive), 6000.0, 1.0);
+  ASSERT_EQ(longer.streets, once.streets);
+  for (size_t i = 0; i + 100 < once.drive.size(); ++i) ASSERT_LT((longer.drive[i] - once.drive[i]).norm(), 1e-9) << i;
+  for (size_t i = 0; i < longer.drive.size(); i += 40) {
+    const auto distance = [&](const Eigen::Vector2d& point) { return (point - longer.drive[i]).norm(); };
+    EXPECT_LT(distance(std::ranges::min(once.drive, {}, distance)), 0.5) << i;
+  }
+}
+
+TEST(PlanRound, NoLongerDriveThanTheWayIsPromised) {
+  EXPECT_NEAR(LengthOf(PlanRound(4, 100.0).drive), 100.0, 1.0);
+  EXPECT_THROW(PlanRound(4, 5000.0), InputError);
+  EXPECT_THROW(PlanStroll(4, 5000.0), InputError);
 }
 
 TEST(PlanFromPoses, FollowsADriveThatIsNotTooLong) {
