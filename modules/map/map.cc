@@ -267,7 +267,7 @@ void Map::AddClosedLoop(const ClosedLoop& loop) {
   closed_loops_.push_back(loop);
 }
 
-// The keyframe has come to see a landmark (1), or no longer sees it soon (-1), which others see.
+// The keyframe sees a landmark that others see, since now (1) or for the last time (-1).
 void Map::CountShared(const MapDelta::ChangedObservation& change, int num) {
   const KeyframeId id = change.observation.keyframe;
   std::vector<CovisibleKeyframe>& covisible = keyframes_.Find(id)->covisible;
@@ -278,7 +278,7 @@ void Map::CountShared(const MapDelta::ChangedObservation& change, int num) {
   }
 }
 
-// The same as counting each observation when it comes, in a fifth of the time for a large map. Each pair of keyframes
+// The same as counting each observation when it comes, in a quarter of the time for a large map. Each pair of keyframes
 // is counted once, at the lower id; so each list fills up by id.
 void Map::CountAllShared() {
   std::vector<int32_t> num_shared(static_cast<size_t>(keyframes_.end_id()), 0);
