@@ -115,7 +115,8 @@ bool KeyframeCuller::AreObserved(const Map& map, KeyframeId id, double share, in
   const auto key = std::pair(num_observers, last_visit);
   ObserverLevels& levels = levels_.try_emplace(key, num_observers, last_visit).first->second;
   const Keyframe& keyframe = *map.FindKeyframe(id);
-  const auto num_landmarks = std::ranges::count_if(keyframe.landmarks, &LandmarkId::valid);
+  const auto num_landmarks =
+      std::ranges::count_if(keyframe.landmarks, [](LandmarkId landmark) { return landmark.valid(); });
   const double min_observed = share * static_cast<double>(num_landmarks);
   auto num_observed = num_landmarks;  // an upper bound until the loop ends
   for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
