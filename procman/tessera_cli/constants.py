@@ -61,6 +61,8 @@ ORDER_REPEAT_S = 0.3
 STOP_POLL_S = 0.01
 RECORDING_POLL_S = 0.1
 MAP_SAVE_PERIOD_S = 60.0
+# In a run's folder: the map that it began with.
+LOADED_MAP = "loaded.tessera"
 EXPERIMENT_POLL_S = 0.1
 RUN_PANEL_PERIOD_S = 0.25
 WATCH_PANEL_PERIOD_S = 0.5

@@ -100,6 +100,18 @@ def test_a_saved_map_is_continued_and_again_the_same_each_time(
         assert continued[0].summary[key] == continued[1].summary[key] is not None
 
 
+def test_a_replay_begins_with_the_map_that_the_run_began_with(
+    tessera: Tessera, sequence: Path, saved: tuple[Finished, Path]
+) -> None:
+    _, path = saved
+    words = ("--sensor", "stereo", "--frames", "10:30")
+    run = tessera.run(f"kitti:{sequence}", *words, "--load-map", path, "--record").must_end_well()
+    again = tessera.run(run.folder / "run.lcmlog", "--sensor", "stereo", command="replay").must_end_well()
+    assert "began with the map" in again.out + again.err
+    for key in ("frames_tracked", "trajectory_sha256", "map_sha256", "warnings"):
+        assert again.summary[key] == run.summary[key], key
+
+
 def test_a_broken_map_file_is_refused_in_one_sentence(
     tessera: Tessera, sequence: Path, saved: tuple[Finished, Path], tmp_path: Path
 ) -> None:

@@ -17,6 +17,7 @@ from tessera_cli.constants import (
     DEFAULT_PORT,
     DRAIN_TIMEOUT_S,
     LISTEN_S,
+    LOADED_MAP,
     START_TIMEOUT_S,
 )
 from tessera_cli.errors import RunError, UserError
@@ -27,7 +28,6 @@ from tessera_cli.runs.live_view import RunView, make_run_view
 from tessera_cli.runs.locks import RunLock
 from tessera_cli.runs.ports import PortLock, take_free_port
 from tessera_cli.runs.run_folder import (
-    LOADED_MAP,
     Result,
     choose_folder,
     keep_loaded_map,

@@ -18,6 +18,7 @@ import numpy as np
 import yaml
 
 from tessera_cli.console import say
+from tessera_cli.constants import LOADED_MAP
 from tessera_cli.errors import UserError
 from tessera_cli.files import ROOT, absolute
 from tessera_cli.maps.occupancy_file import Grid, read_grid
@@ -28,7 +29,6 @@ from tessera_cli.text import visible, visible_values
 
 TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d")
 SETTINGS_FILE = "settings.yaml"
-LOADED_MAP = "loaded.tessera"
 # What a run leaves; files of an earlier run in the same folder must not be taken for its own.
 RUN_FILES = (
     "summary.json",

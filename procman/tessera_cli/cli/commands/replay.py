@@ -1,10 +1,13 @@
 """tessera replay: the whole stack on this machine, fed by a recorded log."""
 
 from argparse import Namespace
+from pathlib import Path
 
 from tessera_cli.cli.commands import run
 from tessera_cli.cli.options import add_run_options
 from tessera_cli.cli.parsing import Commands, add_command
+from tessera_cli.console import say
+from tessera_cli.constants import LOADED_MAP
 
 
 def add_parser(commands: Commands) -> None:
@@ -32,4 +35,10 @@ def main(arguments: Namespace) -> int:
 
         return replay_stage(arguments)
     arguments.source = f"log:{arguments.log}"
+    begun_with = Path(arguments.log).parent / LOADED_MAP
+    if not arguments.map and not arguments.load_map and begun_with.is_file():
+        say(
+            f"the run that was recorded began with the map {begun_with}, and so does this one (--load-map names another)"
+        )
+        arguments.load_map = str(begun_with)
     return run.main(arguments)
