@@ -37,8 +37,6 @@ def main(arguments: Namespace) -> int:
     arguments.source = f"log:{arguments.log}"
     begun_with = Path(arguments.log).parent / LOADED_MAP
     if not arguments.map and not arguments.load_map and begun_with.is_file():
-        say(
-            f"the run that was recorded began with the map {begun_with}, and so does this one (--load-map names another)"
-        )
+        say(f"the recorded run began with {begun_with}, and so does this one (--load-map names another map)")
         arguments.load_map = str(begun_with)
     return run.main(arguments)
