@@ -33,11 +33,17 @@ void OccupancySession::Receive(const CameraFrame& frame) {
   if (frame.sensor == SensorType::kMono || images_.contains(frame.id)) return;
   const bool may_be_keyframe =
       frame.id > last_decided_ || announced_.contains(frame.id) || keyframe_at_.contains(frame.id);
-  if (!may_be_keyframe) return;
+  if (!may_be_keyframe || HasScan(frame.id)) return;
   WaitingImage<CameraFrame> waiting{frame, std::nullopt};
   if (image_bytes_ + BytesOf(frame) > options_.max_image_bytes && !SpillToDisk(waiting)) return;
   image_bytes_ += waiting.bytes_in_memory();
   images_.emplace(frame.id, std::move(waiting));
+}
+
+// A camera that was started again sends frames again, whose color is used up.
+bool OccupancySession::HasScan(FrameId frame) const {
+  const auto keyframe = keyframe_at_.find(frame);
+  return keyframe != keyframe_at_.end() && scans_.contains(keyframe->second);
 }
 
 template <class Images>

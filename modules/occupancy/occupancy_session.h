@@ -80,6 +80,7 @@ class OccupancySession {
   bool SpillToDisk(WaitingImage<Images>& waiting);
   template <class Images>
   void Forget(const WaitingImage<Images>& waiting);
+  bool HasScan(FrameId frame) const;
   std::optional<FrameId> FindImage() const;
   ColorImage TakeColor(FrameId frame);
   void ColorKeypoints(FrameId frame);

@@ -310,6 +310,22 @@ TEST(OccupancySession, ScansWaitForTheirColors) {
   EXPECT_EQ(PointsOf(*map.Find({1})->scan)[0].color, (Rgb{90, 90, 90})) << "there is none, so that it is gray";
 }
 
+// A camera that was started again may send frames again before it hears how far the others are.
+TEST(OccupancySession, AnImageThatComesAgainTakesNoColorAway) {
+  Turn turn(ColorOptions());
+  turn.session().Receive(Painted({0}));
+  turn.SendAll(1);
+  turn.WorkOff();
+  turn.SendImage(Turn::FrameOf({0}));
+  turn.session().Receive(Painted({0}));
+  turn.WorkOff();
+  turn.Move({0}, Shifted(Turn::PoseOf({0}), 0.5));  // its scan is cast anew
+  turn.session().EndMap();
+  turn.WorkOff();
+  ASSERT_TRUE(turn.session().is_done());
+  EXPECT_EQ(PointsOf(*turn.session().occupancy()->Find({0})->scan)[0].color, (Rgb{200, 100, 50}));
+}
+
 TEST(OccupancySession, ScansWhoseColorsDoNotComeAreGray) {
   Turn turn(ColorOptions());
   turn.SendAll(2);
