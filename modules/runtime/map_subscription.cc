@@ -38,8 +38,9 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply a
 // the bus. Another map's file has another hash, and one that can't be read is done without: the mapper tells of it.
 void MapSubscription::TakeRestFromFile() {
   const MapDelta* begun = follower_.BegunSnapshot();
+  if (begun == nullptr) return;
   const std::string path = context_.settings().Get<MapperSettings>().load_map;
-  if (begun == nullptr || path.empty()) return;
+  if (path.empty()) return;
   try {
     MapDelta whole = ReadMapFile(path);
     if (whole.number == begun->number && whole.hash == begun->hash) follower_.ReceiveRest(std::move(whole));
