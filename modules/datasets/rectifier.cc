@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "core/errors.h"
+#include "datasets/remap_table.h"
 
 namespace tessera {
 namespace {
@@ -55,51 +55,14 @@ void ZoomIn(cv::Mat& projection) {
   }
 }
 
-// Where each pixel of the new image comes from, in OpenCV's fixed-point form (1/32 pixel).
-struct RemapTable {
-  cv::Mat whole;
-  cv::Mat fraction;
-
-  RemapTable() = default;
-  RemapTable(const PinholeCamera& camera, const cv::Mat& rotation, const cv::Mat& new_camera) {
-    cv::initUndistortRectifyMap(CameraMatrix(camera), camera.distortion, rotation, new_camera,
-                                cv::Size(camera.width_px, camera.height_px), CV_16SC2, whole, fraction);
-  }
-
-  // The same, rounded to whole pixels. cv::convertMaps would cut the fraction off instead.
-  RemapTable Rounded() const {
-    RemapTable rounded;
-    rounded.whole = whole.clone();
-    constexpr int kHalf = cv::INTER_TAB_SIZE / 2;
-    for (int row = 0; row < whole.rows; ++row) {
-      for (int column = 0; column < whole.cols; ++column) {
-        const int both = fraction.at<uint16_t>(row, column);  // y, x in cv::INTER_BITS each
-        auto& pixel = rounded.whole.at<cv::Vec2s>(row, column);
-        pixel[0] = static_cast<int16_t>(pixel[0] + (both % cv::INTER_TAB_SIZE >= kHalf ? 1 : 0));
-        pixel[1] = static_cast<int16_t>(pixel[1] + (both / cv::INTER_TAB_SIZE >= kHalf ? 1 : 0));
-      }
-    }
-    return rounded;
-  }
-
-  template <class Pixel>
-  Image<Pixel> Apply(Image<Pixel>& image, int type, int interpolation) const {
-    Image<Pixel> result(image.width, image.height);
-    const cv::Mat from(image.height, image.width, type, image.pixels.data());
-    cv::Mat to(result.height, result.width, type, result.pixels.data());
-    cv::remap(from, to, whole, interpolation == cv::INTER_NEAREST ? cv::Mat() : fraction, interpolation,
-              cv::BORDER_CONSTANT);
-    return result;
-  }
-};
+RemapTable TableOf(const PinholeCamera& camera, const cv::Mat& rotation, const cv::Mat& new_camera) {
+  cv::Mat whole, fraction;
+  cv::initUndistortRectifyMap(CameraMatrix(camera), camera.distortion, rotation, new_camera,
+                              cv::Size(camera.width_px, camera.height_px), CV_16SC2, whole, fraction);
+  return {whole, fraction, camera.width_px, camera.height_px};
+}
 
 }  // namespace
-
-struct Rectifier::Maps {
-  RemapTable left;
-  RemapTable right;
-  RemapTable nearest;  // as `left`, rounded to whole pixels
-};
 
 Rectifier::Rectifier(const CameraRig& rig, SensorType sensor) {
   calibration_.sensor = sensor;
@@ -135,9 +98,7 @@ void Rectifier::PrepareSingle(const CameraRig& rig) {
   calibration_.fy_px = matrix.at<double>(1, 1);
   calibration_.cx_px = matrix.at<double>(0, 2);
   calibration_.cy_px = matrix.at<double>(1, 2);
-  maps_ = std::make_unique<Maps>();
-  maps_->left = RemapTable(rig.left, cv::Mat(), matrix);
-  maps_->nearest = maps_->left.Rounded();
+  left_ = std::make_unique<RemapTable>(TableOf(rig.left, cv::Mat(), matrix));
 }
 
 // P_left = [f 0 cx 0; 0 f cy 0; 0 0 1 0],  P_right = the same with -f * baseline [px m] at the top right.
@@ -173,25 +134,16 @@ void Rectifier::PreparePair(const CameraRig& rig) {
         "check the extrinsics in the calibration, or exchange the cameras");
   }
   left_from_rectified_ = Rigid3::FromMatrix(ToEigen(rectified_from_left).transpose(), Eigen::Vector3d::Zero());
-  maps_ = std::make_unique<Maps>();
-  maps_->left = RemapTable(rig.left, rectified_from_left, left_projection);
-  maps_->right = RemapTable(*rig.right, rectified_from_right, right_projection);
+  left_ = std::make_unique<RemapTable>(TableOf(rig.left, rectified_from_left, left_projection));
+  right_ = std::make_unique<RemapTable>(TableOf(*rig.right, rectified_from_right, right_projection));
 }
 
-GrayImage Rectifier::Left(GrayImage image) const {
-  return maps_ ? maps_->left.Apply(image, CV_8UC1, cv::INTER_LINEAR) : std::move(image);
-}
+GrayImage Rectifier::Left(GrayImage image) const { return left_ ? left_->Interpolate(image) : std::move(image); }
 
-ColorImage Rectifier::LeftColor(ColorImage image) const {
-  return maps_ ? maps_->left.Apply(image, CV_8UC3, cv::INTER_LINEAR) : std::move(image);
-}
+ColorImage Rectifier::LeftColor(ColorImage image) const { return left_ ? left_->Interpolate(image) : std::move(image); }
 
-GrayImage Rectifier::Right(GrayImage image) const {
-  return maps_ ? maps_->right.Apply(image, CV_8UC1, cv::INTER_LINEAR) : std::move(image);
-}
+GrayImage Rectifier::Right(GrayImage image) const { return right_ ? right_->Interpolate(image) : std::move(image); }
 
-DepthImage Rectifier::Depth(DepthImage image) const {
-  return maps_ ? maps_->nearest.Apply(image, CV_16UC1, cv::INTER_NEAREST) : std::move(image);
-}
+DepthImage Rectifier::Depth(DepthImage image) const { return left_ ? left_->Nearest(image) : std::move(image); }
 
 }  // namespace tessera

@@ -3,9 +3,7 @@
 //
 // Mono, RGB-D: the same camera without distortion; focal lengths, in their old ratio, and principal point
 // chosen so that no pixel looks outside the original image. Stereo: Bouguet's rectification
-// (cv::stereoRectify), cropped likewise. Intensities are interpolated bilinearly with fixed-point maps, the
-// same bits on every run; depth counts are taken from the nearest pixel, since a mean of two depths is a
-// point where nothing is.
+// (cv::stereoRectify), cropped likewise. Intensities are interpolated, depth counts are not (remap_table.h).
 #pragma once
 
 #include <memory>
@@ -14,6 +12,8 @@
 #include "datasets/camera_rig.h"
 
 namespace tessera {
+
+class RemapTable;
 
 class Rectifier {
  public:
@@ -29,7 +29,7 @@ class Rectifier {
   // Pose of the rectified camera in the frame of the original left camera: a rotation.
   const Rigid3& left_from_rectified() const { return left_from_rectified_; }
   // Whether images pass unchanged.
-  bool is_identity() const { return maps_ == nullptr; }
+  bool is_identity() const { return left_ == nullptr; }
 
   // Images must have the rig's size.
   GrayImage Left(GrayImage image) const;
@@ -38,13 +38,12 @@ class Rectifier {
   DepthImage Depth(DepthImage image) const;
 
  private:
-  struct Maps;
   void PrepareSingle(const CameraRig& rig);
   void PreparePair(const CameraRig& rig);
 
   CameraCalibration calibration_;
   Rigid3 left_from_rectified_;
-  std::unique_ptr<Maps> maps_;
+  std::unique_ptr<RemapTable> left_, right_;  // null: images pass unchanged
 };
 
 }  // namespace tessera
