@@ -47,6 +47,8 @@ struct Channel {
   Delivery delivery = Delivery::kFromFirst;
   Publishers publishers = Publishers::kOne;
   int extractor = -1;  // kTile: whose bus
+  // Messages that no publisher keeps any longer are not lost for good: their values are asked for in another way.
+  bool is_made_up_for = false;
 };
 
 // A channel that carries values of one type.
@@ -71,10 +73,11 @@ inline const Topic<FeatureFrame> kFeatures{"FEATURES", BusKind::kMap, Delivery::
 inline const Topic<PoseEstimate> kPose{"POSE", BusKind::kMain, Delivery::kFromFirst, Publishers::kOne};
 inline const Topic<KeyframeObservation> kKeyframe{"KEYFRAME", BusKind::kMap, Delivery::kFromFirst, Publishers::kOne};
 
-// A late subscriber catches up by a snapshot (map/map_follower.h) instead of the whole history.
-inline const Topic<MapDelta> kMapDelta{"MAP_DELTA", BusKind::kMap, Delivery::kFromNow, Publishers::kOne};
+// A late subscriber, and one that lacks deltas, catches up by MAP_REQUEST (map/map_follower.h).
+inline const Topic<MapDelta> kMapDelta{{"MAP_DELTA", BusKind::kMap, Delivery::kFromNow, Publishers::kOne, -1, true}};
 inline const Topic<MapRequest> kMapRequest{"MAP_REQUEST", BusKind::kMain, Delivery::kFromNow, Publishers::kMany};
-inline const Topic<MapSnapshotPage> kMapSnapshot{"MAP_SNAPSHOT", BusKind::kMap, Delivery::kFromNow, Publishers::kOne};
+inline const Topic<MapSnapshotPage> kMapSnapshot{
+    {"MAP_SNAPSHOT", BusKind::kMap, Delivery::kFromNow, Publishers::kOne, -1, true}};
 inline const Topic<RemovedInDelta> kRemovedKeyframes{"REMOVED_KEYFRAMES", BusKind::kMain, Delivery::kFromFirst,
                                                      Publishers::kOne};
 

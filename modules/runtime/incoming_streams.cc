@@ -38,6 +38,7 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   auto subscription = std::make_unique<Subscription>();
   subscription->channel = channel.name;
   subscription->type = &WireType::Named(type);
+  subscription->is_made_up_for = channel.is_made_up_for;
   subscription->bus = std::move(bus);
   const bool is_journaled = journaled_.contains(channel.name);
   if (is_journaled) {
@@ -248,14 +249,14 @@ std::optional<int64_t> IncomingStreams::next_poll_us() const {
 
 StreamCounts IncomingStreams::counts() const {
   StreamCounts counts;
-  const auto add = [&](const ChannelReceiver& receiver) {
+  const auto add = [&](const ChannelReceiver& receiver, bool is_made_up_for) {
     counts.num_repaired += receiver.counts().num_repaired;
-    counts.num_lost += receiver.counts().num_lost;
+    (is_made_up_for ? counts.num_repaired : counts.num_lost) += receiver.counts().num_lost;
   };
   for (const auto& subscription : subscriptions_) {
-    if (subscription->receiver) add(*subscription->receiver);
+    if (subscription->receiver) add(*subscription->receiver, subscription->is_made_up_for);
   }
-  for (const auto& [channel, receiver] : raw_) add(*receiver);
+  for (const auto& [channel, receiver] : raw_) add(*receiver, false);
   return counts;
 }
 

@@ -62,6 +62,7 @@ class IncomingStreams {
   // When Poll has something to do, by the clock; nullopt: not before something comes.
   std::optional<int64_t> next_poll_us() const;
 
+  // What is lost on a channel where that is made up for counts as repaired.
   StreamCounts counts() const;
   int64_t num_undecodable() const { return num_undecodable_; }
   // Messages that were passed over: no member of the run sent them, or they were heard before.
@@ -74,6 +75,7 @@ class IncomingStreams {
   struct Subscription {
     std::string channel;
     const WireType* type = nullptr;
+    bool is_made_up_for = false;                // as in Channel
     std::unique_ptr<ChannelReceiver> receiver;  // null: unordered
     ChannelReceiver::Sink sink;
     std::shared_ptr<Bus> bus;

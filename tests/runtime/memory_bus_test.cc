@@ -56,17 +56,17 @@ TEST(MemoryBus, EveryTypeArrives) { ForEachSentType(SendAndReceive()); }
 // A camera that sends frames, and a listener that counts them.
 class Pair {
  public:
-  explicit Pair(MemoryBus& bus) : bus_(bus) {}
+  explicit Pair(MemoryBus& bus, Topic<CameraFrame> topic = kCamera) : bus_(bus), topic_(std::move(topic)) {}
 
   void StartListener() {
-    bus_.AddContext("listener").Subscribe(kCamera, [this](const CameraFrame& frame) {
+    bus_.AddContext("listener").Subscribe(topic_, [this](const CameraFrame& frame) {
       received.push_back(frame.id.value);
     });
     bus_.AddContext("watcher").Subscribe(kStatus, [this](const StageStatus& new_status) {
       if (new_status.name == "listener") status = new_status;
     });
   }
-  void StartCamera() { frames_ = bus_.AddContext("camera").Advertise(kCamera); }
+  void StartCamera() { frames_ = bus_.AddContext("camera").Advertise(topic_); }
   void Send(int num_frames) {
     for (int i = 0; i < num_frames; ++i) {
       CameraFrame frame{.id = {num_sent_++}, .left = GrayImage(500, 400)};
@@ -83,6 +83,7 @@ class Pair {
 
  private:
   MemoryBus& bus_;
+  const Topic<CameraFrame> topic_;
   Publisher<CameraFrame> frames_;
   int64_t num_sent_ = 0;
 };
@@ -174,13 +175,10 @@ TEST(MemoryBus, WhoComesLateGetsWhatIsKept) {
   pair.ExpectReceived(0, 29);
 }
 
-TEST(MemoryBus, WhatNobodyKeepsIsCountedAsLost) {
-  Settings settings = Defaults();
-  settings.Override("stream.history_bytes=1000000");  // five frames
-  MemoryBus bus(settings);
+// 20 frames are lost of which the camera keeps five.
+void LoseForGood(MemoryBus& bus, Pair& pair) {
   bool loses = false;
   bus.LoseMessages([&](const std::string& channel) { return loses && channel == "CAMERA"; });
-  Pair pair(bus);
   pair.StartListener();
   pair.StartCamera();
   pair.Send(2);
@@ -192,8 +190,31 @@ TEST(MemoryBus, WhatNobodyKeepsIsCountedAsLost) {
   ASSERT_TRUE(bus.RunUntil([&] { return !pair.received.empty() && pair.received.back() == 22; }));
   bus.RunUntilQuiet();
   EXPECT_LT(pair.received.size(), 10U);
+}
+
+Settings KeepingFiveFrames() {
+  Settings settings = Defaults();
+  settings.Override("stream.history_bytes=1000000");
+  return settings;
+}
+
+TEST(MemoryBus, WhatNobodyKeepsIsCountedAsLost) {
+  MemoryBus bus(KeepingFiveFrames());
+  Pair pair(bus);
+  LoseForGood(bus, pair);
   EXPECT_GE(pair.status.num_lost, 16 * 4);
   EXPECT_NE(pair.status.last_error.find("CAMERA"), std::string::npos);
+}
+
+TEST(MemoryBus, WhatIsMadeUpForCountsAsRepaired) {
+  MemoryBus bus(KeepingFiveFrames());
+  Topic<CameraFrame> topic = kCamera;
+  topic.is_made_up_for = true;
+  Pair pair(bus, topic);
+  LoseForGood(bus, pair);
+  EXPECT_EQ(pair.status.num_lost, 0);
+  EXPECT_GE(pair.status.num_repaired, 16 * 4);
+  EXPECT_EQ(pair.status.last_error, "");
 }
 
 TEST(MemoryBus, ARestartedPublisherIsHeard) {
