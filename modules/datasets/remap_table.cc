@@ -1,6 +1,5 @@
 #include "datasets/remap_table.h"
 
-#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -29,16 +28,9 @@ struct Place {
 // With the four pixels a b   and right, down in steps of s = 1 / kSteps:
 //                      c d
 //   (1 - down s) ((1 - right s) a + right s b) + down s ((1 - right s) c + right s d), rounded.
-int Blend(int a, int b, int c, int d, int right, int down) {
-  const int upper = RemapTable::kSteps * a + right * (b - a);
-  const int lower = RemapTable::kSteps * c + right * (d - c);
-  return (RemapTable::kSteps * upper + down * (lower - upper) + kHalf * RemapTable::kSteps) /
-         (RemapTable::kSteps * RemapTable::kSteps);
-}
-
-// The same for pixels a b c d in the four bytes of `corners`, the lowest first: both rows at once, in 16 bits each, of
-// which neither runs over in the end, whatever is borrowed in between.
-uint8_t BlendPacked(uint32_t corners, uint32_t right, uint32_t down) {
+// They are the four bytes of `corners`, a the lowest: both rows are computed at once, in 16 bits each, of which neither
+// runs over in the end, whatever is borrowed in between.
+uint8_t Blend(uint32_t corners, uint32_t right, uint32_t down) {
   constexpr uint32_t kSteps = RemapTable::kSteps;
   const uint32_t lefts = corners & 0x00FF00FF, rights = corners >> 8 & 0x00FF00FF;
   const uint32_t rows = kSteps * lefts + right * (rights - lefts);
@@ -63,7 +55,7 @@ void FetchCorners(const uint8_t* pixels, int width, const int32_t* upper_left, s
 void BlendRow(const std::vector<uint32_t>& corners, const uint8_t* right, const uint8_t* down, uint8_t* blended) {
   const uint32_t* corners_of_row = corners.data();
   const size_t width = corners.size();
-  for (size_t x = 0; x < width; ++x) blended[x] = BlendPacked(corners_of_row[x], right[x], down[x]);
+  for (size_t x = 0; x < width; ++x) blended[x] = Blend(corners_of_row[x], right[x], down[x]);
 }
 
 }  // namespace
@@ -106,8 +98,9 @@ ColorImage RemapTable::Interpolate(const ColorImage& image) const {
   for (size_t i = 0; i < result.pixels.size(); ++i) {
     const Rgb* pixel = image.pixels.data() + upper_left_[i];
     const auto blend = [&](uint8_t Rgb::* channel) {
-      return static_cast<uint8_t>(Blend(pixel[0].*channel, pixel[1].*channel, pixel[width_].*channel,
-                                        pixel[width_ + 1].*channel, steps_right_[i], steps_down_[i]));
+      const uint32_t a = pixel[0].*channel, b = pixel[1].*channel;
+      const uint32_t c = pixel[width_].*channel, d = pixel[width_ + 1].*channel;
+      return Blend(a | b << 8 | c << 16 | d << 24, steps_right_[i], steps_down_[i]);
     };
     result.pixels[i] = {blend(&Rgb::red), blend(&Rgb::green), blend(&Rgb::blue)};
   }
