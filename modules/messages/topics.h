@@ -40,15 +40,20 @@ enum class Publishers {
   kMany,
 };
 
+// What becomes of messages that no publisher keeps any longer.
+enum class Unrepaired {
+  kLost,       // for good: an error
+  kRequested,  // their values are asked for in another way
+};
+
 // A channel without the type of its values.
 struct Channel {
   std::string name;  // without prefix
   BusKind bus = BusKind::kMain;
   Delivery delivery = Delivery::kFromFirst;
   Publishers publishers = Publishers::kOne;
+  Unrepaired unrepaired = Unrepaired::kLost;
   int extractor = -1;  // kTile: whose bus
-  // Messages that no publisher keeps any longer are not lost for good: their values are asked for in another way.
-  bool is_made_up_for = false;
 };
 
 // A channel that carries values of one type.
@@ -74,10 +79,11 @@ inline const Topic<PoseEstimate> kPose{"POSE", BusKind::kMain, Delivery::kFromFi
 inline const Topic<KeyframeObservation> kKeyframe{"KEYFRAME", BusKind::kMap, Delivery::kFromFirst, Publishers::kOne};
 
 // A late subscriber, and one that lacks deltas, catches up by MAP_REQUEST (map/map_follower.h).
-inline const Topic<MapDelta> kMapDelta{{"MAP_DELTA", BusKind::kMap, Delivery::kFromNow, Publishers::kOne, -1, true}};
+inline const Topic<MapDelta> kMapDelta{
+    {"MAP_DELTA", BusKind::kMap, Delivery::kFromNow, Publishers::kOne, Unrepaired::kRequested}};
 inline const Topic<MapRequest> kMapRequest{"MAP_REQUEST", BusKind::kMain, Delivery::kFromNow, Publishers::kMany};
 inline const Topic<MapSnapshotPage> kMapSnapshot{
-    {"MAP_SNAPSHOT", BusKind::kMap, Delivery::kFromNow, Publishers::kOne, -1, true}};
+    {"MAP_SNAPSHOT", BusKind::kMap, Delivery::kFromNow, Publishers::kOne, Unrepaired::kRequested}};
 inline const Topic<RemovedInDelta> kRemovedKeyframes{"REMOVED_KEYFRAMES", BusKind::kMain, Delivery::kFromFirst,
                                                      Publishers::kOne};
 
@@ -104,7 +110,8 @@ inline constexpr int kMaxExtractors = 256;  // ids are 0 .. kMaxExtractors - 1: 
 
 // The jobs of one extractor. Those of an extractor that died are given to others: its successor must not repeat them.
 inline Topic<TileJob> TileTopic(int extractor) {
-  return {{"TILE_" + std::to_string(extractor), BusKind::kTile, Delivery::kFromNow, Publishers::kOne, extractor}};
+  return {{"TILE_" + std::to_string(extractor), BusKind::kTile, Delivery::kFromNow, Publishers::kOne, Unrepaired::kLost,
+           extractor}};
 }
 
 }  // namespace tessera

@@ -38,7 +38,7 @@ void IncomingStreams::Add(const Channel& channel, const char* type, std::shared_
   auto subscription = std::make_unique<Subscription>();
   subscription->channel = channel.name;
   subscription->type = &WireType::Named(type);
-  subscription->is_made_up_for = channel.is_made_up_for;
+  subscription->unrepaired = channel.unrepaired;
   subscription->bus = std::move(bus);
   const bool is_journaled = journaled_.contains(channel.name);
   if (is_journaled) {
@@ -249,14 +249,14 @@ std::optional<int64_t> IncomingStreams::next_poll_us() const {
 
 StreamCounts IncomingStreams::counts() const {
   StreamCounts counts;
-  const auto add = [&](const ChannelReceiver& receiver, bool is_made_up_for) {
+  const auto add = [&](const ChannelReceiver& receiver, Unrepaired unrepaired) {
     counts.num_repaired += receiver.counts().num_repaired;
-    (is_made_up_for ? counts.num_repaired : counts.num_lost) += receiver.counts().num_lost;
+    (unrepaired == Unrepaired::kRequested ? counts.num_repaired : counts.num_lost) += receiver.counts().num_lost;
   };
   for (const auto& subscription : subscriptions_) {
-    if (subscription->receiver) add(*subscription->receiver, subscription->is_made_up_for);
+    if (subscription->receiver) add(*subscription->receiver, subscription->unrepaired);
   }
-  for (const auto& [channel, receiver] : raw_) add(*receiver, false);
+  for (const auto& [channel, receiver] : raw_) add(*receiver, Unrepaired::kLost);
   return counts;
 }
 

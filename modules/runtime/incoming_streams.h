@@ -75,7 +75,7 @@ class IncomingStreams {
   struct Subscription {
     std::string channel;
     const WireType* type = nullptr;
-    bool is_made_up_for = false;                // as in Channel
+    Unrepaired unrepaired = Unrepaired::kLost;
     std::unique_ptr<ChannelReceiver> receiver;  // null: unordered
     ChannelReceiver::Sink sink;
     std::shared_ptr<Bus> bus;

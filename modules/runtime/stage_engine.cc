@@ -118,12 +118,12 @@ void StageEngine::Subscribe(const Channel& channel, const char* type, MakeReceiv
     if (!receiver) receiver = make_receiver();
     Receive(name, *receiver, delivery, message, header, arrival_us);
   };
-  sink.lose = [this, receivers, name = channel.name, is_made_up_for = channel.is_made_up_for](
-                  const std::string& publisher, int64_t num_messages) {
+  sink.lose = [this, receivers, name = channel.name, unrepaired = channel.unrepaired](const std::string& publisher,
+                                                                                      int64_t num_messages) {
     if (const auto it = receivers->find(publisher); it != receivers->end()) it->second->Interrupt();
     if (num_messages == 0) return;
     const std::string which = std::to_string(num_messages) + " messages of " + publisher + " on " + name;
-    if (is_made_up_for) {
+    if (unrepaired == Unrepaired::kRequested) {
       log_(false, which + " did not come; what they said is asked for in another way");
     } else {
       ReportError(which + " are lost: they were asked for again and did not come");

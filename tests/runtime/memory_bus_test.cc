@@ -210,7 +210,7 @@ TEST(MemoryBus, WhatNobodyKeepsIsCountedAsLost) {
 TEST(MemoryBus, WhatIsMadeUpForCountsAsRepaired) {
   MemoryBus bus(KeepingFiveFrames());
   Topic<CameraFrame> topic = kCamera;
-  topic.is_made_up_for = true;
+  topic.unrepaired = Unrepaired::kRequested;
   Pair pair(bus, topic);
   LoseForGood(bus, pair);
   EXPECT_EQ(pair.status.num_lost, 0);
