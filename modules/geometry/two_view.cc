@@ -1,5 +1,6 @@
 #include "geometry/two_view.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -110,21 +111,33 @@ RefinedMotion RefineOnInliers(const TwoViewProblem& problem, const Rigid3& motio
   return refined;
 }
 
-// Truncated squared errors of all pairs, in units of the limit: how ill the motion explains them. A pair whose point
-// stands behind a camera is not explained. Points that are too far for parallax count like others: the motion that puts
-// most points near is not therefore the true one.
+// Squared error of a pair, in ray units: of the nearest pair that a point in front of both cameras, or at infinity,
+// allows. Where the epipolar constraint puts the point behind a camera, that is the point at infinity, R x1: noise
+// alone puts every other point of the sky there. (The difference of two views has twice the variance of one.)
+double ErrorSquared(const Rigid3& motion, const Eigen::Matrix3d& essential, const RayPair& pair, double limit_squared) {
+  const double distance = SampsonDistance(essential, pair);
+  if (distance * distance >= limit_squared) {
+    return limit_squared;
+  }
+  const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
+  if (point && point->z() > 0.0 && (motion * *point).z() > 0.0) {
+    return distance * distance;
+  }
+  const Eigen::Vector3d at_infinity = motion.rotation * pair.first;
+  if (!(at_infinity.z() > 0.0)) {
+    return limit_squared;
+  }
+  return 0.5 * (at_infinity.hnormalized() - pair.second.hnormalized()).squaredNorm();
+}
+
+// Truncated squared errors of all pairs, in units of the limit: how ill the motion explains them. Points that are too
+// far for parallax count like others: the motion that puts most points near is not therefore the true one.
 double Cost(const TwoViewProblem& problem, const Rigid3& motion) {
   const Eigen::Matrix3d essential = EssentialFromMotion(motion);
   double cost = 0.0;
   for (const RayPair& pair : problem.rays) {
-    const double distance = SampsonDistance(essential, pair);
-    double share = std::min(1.0, distance * distance / problem.limit_squared);
-    if (share < 1.0) {
-      const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
-      const bool is_in_front = point && point->z() > 0.0 && (motion * *point).z() > 0.0;
-      share = is_in_front ? share : 1.0;
-    }
-    cost += share;
+    const double error_squared = ErrorSquared(motion, essential, pair, problem.limit_squared);
+    cost += std::min(1.0, error_squared / problem.limit_squared);
   }
   return cost;
 }

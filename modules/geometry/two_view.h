@@ -42,10 +42,10 @@ struct TwoViewResult {
 
 // Samples essential matrices (any scene) and homographies (a plane, where an essential matrix is not fixed by its
 // points), takes every motion that the best of each kind allows, refines each on all its inliers, and keeps the one
-// that explains the pairs best: least sum of truncated squared errors, points behind a camera counted as unexplained.
-// (Not the one with most points of good parallax: a wrong motion sideways gives parallax to all.) nullopt if fewer than
-// min_points have a small error and enough parallax, if a clearly different motion explains nearly as much, or if the
-// direction of translation is poorly known. `seed` decides the samples.
+// that explains the pairs best: least sum of truncated squared errors from what points in front of both cameras, or at
+// infinity, can show. (Not the one with most points of good parallax: a wrong motion sideways gives parallax to all.)
+// nullopt if fewer than min_points have a small error and enough parallax, if a clearly different motion explains
+// nearly as much, or if the direction of translation is poorly known. `seed` decides the samples.
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
                                              uint64_t seed, const TwoViewOptions& options);
 

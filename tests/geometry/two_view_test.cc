@@ -70,6 +70,26 @@ TEST(EstimateTwoView, IsRightOrRefusesOnAPlane) {
   }
 }
 
+// A road beside a house front, below a sky. The front alone allows a step aside with a turn, too, which puts the sky
+// near. Noise puts half of the sky behind the camera that drove ahead, and that says nothing against it.
+TEST(EstimateTwoView, NoiseInTheSkySaysNothingAgainstDrivingAhead) {
+  const CameraCalibration camera = MakeCamera();
+  const Rigid3 ahead{ExpSO3({0.002, 0.001, 0.001}), {0.0, 0.0, -2.5}};
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 450; ++i) {
+    points.push_back(1e5 * camera.Ray({20.0 + 2.67 * i, 240.0 - (37 * i) % 80}));
+  }
+  for (int i = 0; i < 500; ++i) {
+    points.emplace_back(-6.0, -0.5 - 0.006 * ((97 * i) % 500), 9.0 + 0.05 * i);
+  }
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    const auto result = EstimateTwoView(camera, MakePairs(points, ahead, 0.5, 0), seed, {});
+    ASSERT_TRUE(result.has_value()) << seed;
+    EXPECT_LT(RotationError(result->second_from_first, ahead), 0.01) << seed;
+    EXPECT_LT(DirectionError(result->second_from_first, ahead), 0.1) << seed;
+  }
+}
+
 // Noisy pairs of a plane leave open how much of a step aside is a turn; where the camera is expected decides that.
 TEST(EstimateTwoView, AnExpectedDirectionTellsTurningFromMovingAside) {
   const Rigid3 motion{ExpSO3({0.0, -0.5, 0.0}), {0.2, 0.0, -1.1}};
