@@ -196,22 +196,26 @@ Result<> TwoViewOptions::Check() const {
 }
 
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
-                                             uint64_t seed, const TwoViewOptions& options) {
+                                             uint64_t seed, const TwoViewOptions& options,
+                                             std::span<const Rigid3> guesses) {
   if (pairs.size() < static_cast<size_t>(options.min_points)) {
     return std::nullopt;
   }
   const TwoViewProblem problem = MakeProblem(calibration, pairs, options);
+  std::vector<Rigid3> motions = PossibleMotions(problem, seed);
+  motions.insert(motions.end(), guesses.begin(), guesses.end());
   std::vector<Candidate> candidates;
-  for (const Rigid3& motion : PossibleMotions(problem, seed)) {
+  for (const Rigid3& motion : motions) {
     candidates.push_back(Evaluate(problem, RefineOnInliers(problem, motion)));
   }
   const auto best = std::min_element(candidates.begin(), candidates.end(),
                                      [](const auto& a, const auto& b) { return a.cost < b.cost; });
-  if (best == candidates.end() || best->num_points < options.min_points || HasRival(problem, candidates, *best) ||
-      DirectionSigma(best->motion, problem.sigma) > options.max_direction_sigma_rad) {
+  if (best == candidates.end()) {
     return std::nullopt;
   }
-  return TwoViewResult{best->motion.second_from_first, best->points, best->num_points};
+  const bool is_clear = best->num_points >= options.min_points && !HasRival(problem, candidates, *best) &&
+                        DirectionSigma(best->motion, problem.sigma) <= options.max_direction_sigma_rad;
+  return TwoViewResult{best->motion.second_from_first, best->points, best->num_points, is_clear};
 }
 
 }  // namespace tessera

@@ -38,15 +38,18 @@ struct TwoViewResult {
   Rigid3 second_from_first;                            // |translation| = 1
   std::vector<std::optional<Eigen::Vector3d>> points;  // by pair, in the first camera; nullopt: not a good point
   int num_points = 0;
+  bool is_clear = false;  // see EstimateTwoView
 };
 
 // Samples essential matrices (any scene) and homographies (a plane, where an essential matrix is not fixed by its
-// points), takes every motion that the best of each kind allows, refines each on all its inliers, and keeps the one
-// that explains the pairs best: least sum of truncated squared errors from what points in front of both cameras, or at
-// infinity, can show. (Not the one with most points of good parallax: a wrong motion sideways gives parallax to all.)
-// nullopt if fewer than min_points have a small error and enough parallax, if a clearly different motion explains
-// nearly as much, or if the direction of translation is poorly known. `seed` decides the samples.
+// points), takes every motion that the best of each kind allows, and `guesses`; refines each on all its inliers, and
+// keeps the one that explains the pairs best: least sum of truncated squared errors from what points in front of both
+// cameras, or at infinity, can show. (Not the one with most points of good parallax: a wrong motion sideways gives
+// parallax to all.) It is clear if at least min_points have a small error and enough parallax, no clearly different
+// motion explains nearly as much, and the direction of translation is well known. nullopt if there are fewer than
+// min_points pairs, or no motion. `seed` decides the samples.
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
-                                             uint64_t seed, const TwoViewOptions& options);
+                                             uint64_t seed, const TwoViewOptions& options,
+                                             std::span<const Rigid3> guesses = {});
 
 }  // namespace tessera

@@ -48,8 +48,11 @@ std::optional<MonoStart> MonoInitializer::Add(const std::shared_ptr<const FrameV
     pairs.push_back({reference_->pixel(match.first), frame->pixel(match.second)});
   }
   const auto seed = static_cast<uint64_t>(frame->features().frame.value);
-  const auto views = EstimateTwoView(frame->calibration(), pairs, seed, options_.two_view);
-  if (!views) {
+  const auto views = EstimateTwoView(frame->calibration(), pairs, seed, options_.two_view, guesses_);
+  if (views) {
+    guesses_ = {views->second_from_first};
+  }
+  if (!views || !views->is_clear) {
     return std::nullopt;
   }
   MonoStart start = MakeStart(frame, matches, *views);
@@ -63,6 +66,7 @@ std::optional<MonoStart> MonoInitializer::Add(const std::shared_ptr<const FrameV
 void MonoInitializer::SetReference(const std::shared_ptr<const FrameView>& frame) {
   reference_ = frame->size() >= options_.min_matches ? frame : nullptr;
   last_seen_px_.clear();
+  guesses_.clear();
   for (int i = 0; i < frame->size(); ++i) {
     last_seen_px_.push_back(frame->pixel(i));
   }

@@ -53,6 +53,7 @@ class MonoInitializer {
   InitializerOptions options_;
   std::shared_ptr<const FrameView> reference_;
   std::vector<Eigen::Vector2d> last_seen_px_;  // by keypoint of the reference
+  std::vector<Rigid3> guesses_;                // the best motion of the last try: samples alone may miss it in this one
 };
 
 }  // namespace tessera

@@ -68,7 +68,7 @@ std::optional<Rigid3> EstimatePairMotion(const TrackedFrame& last, const FrameVi
   for (const Match& match : matches) pairs.push_back({last.view->pixel(match.first), current.pixel(match.second)});
   const auto seed = static_cast<uint64_t>(current.features().frame.value);
   const auto views = EstimateTwoView(current.calibration(), pairs, seed, WithPrior(options, expected));
-  if (!views) return std::nullopt;
+  if (!views || !views->is_clear) return std::nullopt;
   const std::optional<double> length = CommonLength(StepLengths(last, matches, *views), options);
   Rigid3 last_from_current = views->second_from_first.Inverse();
   if (length) {
