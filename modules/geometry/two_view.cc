@@ -27,7 +27,8 @@ struct Candidate {
   RefinedMotion motion;
   std::vector<std::optional<Eigen::Vector3d>> points;  // by pair; nullopt: not a good point
   int num_points = 0;
-  double cost = 0.0;  // see Cost()
+  std::vector<double> errors;  // by pair: squared and truncated, in units of the limit
+  double cost = 0.0;           // their sum: how ill the motion explains the pairs
 };
 
 TwoViewProblem MakeProblem(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
@@ -130,24 +131,19 @@ double ErrorSquared(const Rigid3& motion, const Eigen::Matrix3d& essential, cons
   return 0.5 * (at_infinity.hnormalized() - pair.second.hnormalized()).squaredNorm();
 }
 
-// Truncated squared errors of all pairs, in units of the limit: how ill the motion explains them. Points that are too
-// far for parallax count like others: the motion that puts most points near is not therefore the true one.
-double Cost(const TwoViewProblem& problem, const Rigid3& motion) {
-  const Eigen::Matrix3d essential = EssentialFromMotion(motion);
-  double cost = 0.0;
-  for (const RayPair& pair : problem.rays) {
-    const double error_squared = ErrorSquared(motion, essential, pair, problem.limit_squared);
-    cost += std::min(1.0, error_squared / problem.limit_squared);
-  }
-  return cost;
-}
-
+// Points that are too far for parallax count in the cost like others: the motion that puts most points near is not
+// therefore the true one.
 Candidate Evaluate(const TwoViewProblem& problem, const RefinedMotion& motion) {
-  Candidate candidate{motion, {}, 0, Cost(problem, motion.second_from_first)};
+  Candidate candidate{.motion = motion};
   candidate.points.reserve(problem.rays.size());
+  candidate.errors.reserve(problem.rays.size());
+  const Eigen::Matrix3d essential = EssentialFromMotion(motion.second_from_first);
   for (const RayPair& pair : problem.rays) {
     candidate.points.push_back(GoodPoint(problem, motion.second_from_first, pair));
     candidate.num_points += candidate.points.back().has_value() ? 1 : 0;
+    const double error_squared = ErrorSquared(motion.second_from_first, essential, pair, problem.limit_squared);
+    candidate.errors.push_back(std::min(1.0, error_squared / problem.limit_squared));
+    candidate.cost += candidate.errors.back();
   }
   return candidate;
 }
@@ -176,20 +172,39 @@ bool AreDifferent(const Rigid3& a, const Rigid3& b) {
   return LogSO3(a.rotation.conjugate() * b.rotation).norm() > 0.05 || a.translation.dot(b.translation) < 0.966;
 }
 
-// Whether a motion other than the best explains nearly as much.
-bool HasRival(const TwoViewProblem& problem, const std::vector<Candidate>& candidates, const Candidate& best) {
-  const auto explained = [&](const Candidate& c) { return static_cast<double>(problem.rays.size()) - c.cost; };
+// By how many standard deviations `other` explains the pairs worse than `best`.
+double StandardizedDifference(const Candidate& other, const Candidate& best) {
+  double sum = 0.0, sum_of_squares = 0.0;
+  for (size_t i = 0; i < best.errors.size(); ++i) {
+    const double difference = other.errors[i] - best.errors[i];
+    sum += difference;
+    sum_of_squares += difference * difference;
+  }
+  return sum_of_squares > 0.0 ? sum / std::sqrt(sum_of_squares) : 0.0;
+}
+
+bool HasRival(const std::vector<Candidate>& candidates, const Candidate& best, double min_z) {
   return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& other) {
-    return explained(other) > problem.options.max_rival_share * explained(best) &&
-           AreDifferent(other.motion.second_from_first, best.motion.second_from_first);
+    return AreDifferent(other.motion.second_from_first, best.motion.second_from_first) &&
+           StandardizedDifference(other, best) < min_z;
   });
+}
+
+// Whether enough pairs moved for their points to have parallax, up to a turn that cancels half of it: a camera that
+// stands still for minutes need not sample motions all the time.
+bool HasMoved(const TwoViewProblem& problem) {
+  const double min_cosine = std::cos(0.5 * problem.options.min_parallax_rad);
+  const auto num_moved = std::count_if(problem.rays.begin(), problem.rays.end(), [&](const RayPair& pair) {
+    return pair.first.dot(pair.second) < min_cosine * pair.first.norm() * pair.second.norm();
+  });
+  return num_moved >= problem.options.min_points;
 }
 
 }  // namespace
 
 Result<> TwoViewOptions::Check() const {
   if (!(sigma_px > 0.0) || ransac_iterations < 1 || min_points < 8 || !(min_parallax_rad > 0.0) ||
-      !(max_rival_share > 0.0) || !(max_direction_sigma_rad > 0.0)) {
+      !(min_rival_z >= 0.0) || !(max_direction_sigma_rad > 0.0)) {
     return Failed("two-view options must be positive, and min_points at least 8");
   }
   return {};
@@ -202,6 +217,9 @@ std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibratio
     return std::nullopt;
   }
   const TwoViewProblem problem = MakeProblem(calibration, pairs, options);
+  if (!HasMoved(problem)) {
+    return std::nullopt;
+  }
   std::vector<Rigid3> motions = PossibleMotions(problem, seed);
   motions.insert(motions.end(), guesses.begin(), guesses.end());
   std::vector<Candidate> candidates;
@@ -213,8 +231,9 @@ std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibratio
   if (best == candidates.end()) {
     return std::nullopt;
   }
-  const bool is_clear = best->num_points >= options.min_points && !HasRival(problem, candidates, *best) &&
-                        DirectionSigma(best->motion, problem.sigma) <= options.max_direction_sigma_rad;
+  const bool is_clear = best->num_points >= options.min_points &&
+                        DirectionSigma(best->motion, problem.sigma) <= options.max_direction_sigma_rad &&
+                        !HasRival(candidates, *best, options.min_rival_z);
   return TwoViewResult{best->motion.second_from_first, best->points, best->num_points, is_clear};
 }
 

@@ -26,9 +26,9 @@ struct TwoViewOptions {
   int ransac_iterations = 300;           // samples for each model: 8 good of 8 are met with 99 % at 60 % good matches
   int min_points = 60;                   // points with good parallax and small error that a start needs
   double min_parallax_rad = 0.017;  // 1 degree: a point's depth is then good to about sigma_px / (f * 0.017) ~ 10 %
-  double max_rival_share = 0.75;    // a different motion that explains more than this share of what the best explains
-                                    // makes the case ambiguous
-  double max_direction_sigma_rad = 0.03;  // of the translation: worse, and turning can't be told from moving aside
+  double min_rival_z = 8.0;         // how many standard deviations worse each clearly different motion must be, see
+                                    // EstimateTwoView; 0: a rival is no matter
+  double max_direction_sigma_rad = 0.02;  // of the translation: worse, and turning can't be told from moving aside
   std::optional<DirectionPrior> prior;    // takes part in the motion, and in how well its direction is known
 
   Result<> Check() const;
@@ -45,9 +45,11 @@ struct TwoViewResult {
 // points), takes every motion that the best of each kind allows, and `guesses`; refines each on all its inliers, and
 // keeps the one that explains the pairs best: least sum of truncated squared errors from what points in front of both
 // cameras, or at infinity, can show. (Not the one with most points of good parallax: a wrong motion sideways gives
-// parallax to all.) It is clear if at least min_points have a small error and enough parallax, no clearly different
-// motion explains nearly as much, and the direction of translation is well known. nullopt if there are fewer than
-// min_points pairs, or no motion. `seed` decides the samples.
+// parallax to all.) It is clear if at least min_points have a small error and enough parallax, the direction of
+// translation is well known, and each clearly different motion is worse beyond doubt: with d the difference of both
+// errors of a pair,
+//   z = sum d / sqrt(sum d^2) >= min_rival_z          (Vuong 1989, for models that are both approximations).
+// nullopt if fewer than min_points pairs moved, or there is no motion. `seed` decides the samples.
 std::optional<TwoViewResult> EstimateTwoView(const CameraCalibration& calibration, std::span<const PixelPair> pairs,
                                              uint64_t seed, const TwoViewOptions& options,
                                              std::span<const Rigid3> guesses = {});

@@ -14,8 +14,11 @@ namespace tessera {
 
 struct PairMotionOptions {
   MatchingOptions matching;  // anywhere in the image
-  TwoViewOptions two_view{
-      .ransac_iterations = 3000, .min_points = 50, .min_parallax_rad = 0.005, .max_rival_share = 1.0};
+  TwoViewOptions two_view{.ransac_iterations = 3000,
+                          .min_points = 50,
+                          .min_parallax_rad = 0.005,
+                          .min_rival_z = 0.0,
+                          .max_direction_sigma_rad = 0.03};
   int min_known_points = 8;        // whose depth tells the length of the step
   double max_depth_spread = 0.25;  // half of them must agree on it within this share
   double min_cos_expected = 0.8;   // without them: between the step and the expected one

@@ -117,7 +117,7 @@ TEST(EstimateTwoView, AnExpectedDirectionTellsTurningFromMovingAside) {
   const Rigid3 motion{ExpSO3({0.0, -0.5, 0.0}), {0.2, 0.0, -1.1}};
   const auto pairs = MakePairs(MakePoints(Scene::kPlane, motion, 300), motion, 0.5, 5);
   const Eigen::Vector3d way = -(ExpSO3(0.5 * LogSO3(motion.rotation)).conjugate() * motion.translation);
-  TwoViewOptions options{.max_rival_share = 1.0, .max_direction_sigma_rad = 0.15};
+  TwoViewOptions options{.min_rival_z = 0.0, .max_direction_sigma_rad = 0.15};
   options.prior = {ExpSO3({0.0, 0.05, 0.0}) * way, 0.1};
   const auto result = EstimateClear(pairs, 5, options);
   ASSERT_TRUE(result.has_value());
@@ -130,6 +130,12 @@ TEST(EstimateTwoView, RefusesARotationOnTheSpot) {
   for (const Scene scene : {Scene::kGeneral, Scene::kPlane}) {
     EXPECT_FALSE(Estimate(scene, turn, 0.5, 0).has_value());
   }
+}
+
+TEST(EstimateTwoView, ACameraThatStandsStillIsNotSampled) {
+  const Rigid3 still{Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.0}};
+  const auto pairs = MakePairs(MakePoints(Scene::kGeneral, still, 300), still, 0.5, 0);
+  EXPECT_FALSE(EstimateTwoView(MakeCamera(), pairs, 5, {}).has_value());
 }
 
 TEST(EstimateTwoView, RefusesTooLittleParallaxAndTooFewPairs) {
