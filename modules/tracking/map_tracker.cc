@@ -39,6 +39,10 @@ PoseInfluences ByPoint(PoseInfluences influences, bool are_shared) {
   return influences;
 }
 
+double SecondsBetween(const FrameView& first, const FrameView& second) {
+  return 1e-6 * static_cast<double>(second.features().utime_us - first.features().utime_us);
+}
+
 // A point as one view alone knows it, in the frame of its camera. `covariance`: of the point, if its depth isn't known
 // by the view itself.
 Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera,
@@ -219,6 +223,8 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
                                                    InWorld(Sim3::From(world_from_start_), in_camera)};
   }
   replica_.Send(first_id, std::move(sent));
+  const double interval_s = SecondsBetween(*start->first, *start->second);
+  if (interval_s > 0.0) motion_.Guess(first_from_second, interval_s);
   last_.emplace(Last{std::move(second), Rigid3::Identity()});
   keyframes.push_back(MakeKeyframe(last_->frame, first_id, first_from_second));
   return true;
@@ -228,15 +234,14 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
 // it was lost, and on its way from there. That is a guess until a loop joins the parts.
 void MapTracker::TakeOverMotion(MonoStart& start) {
   if (!drift_) return;
-  const int64_t first_us = start.first->features().utime_us, second_us = start.second->features().utime_us;
-  const double interval_s = 1e-6 * static_cast<double>(second_us - first_us);
+  const double interval_s = SecondsBetween(*start.first, *start.second);
   const double scale = drift_->velocity.norm() * interval_s / start.second_from_first.translation.norm();
   start.second_from_first.translation *= scale;
   for (MonoStart::Point& point : start.points) {
     point.point.point_in_world *= scale;
     point.point.covariance *= scale * scale;
   }
-  const double lost_s = 1e-6 * static_cast<double>(first_us - drift_->utime_us);
+  const double lost_s = 1e-6 * static_cast<double>(start.first->features().utime_us - drift_->utime_us);
   world_from_start_ = world_from_start_ * Rigid3{Eigen::Quaterniond::Identity(), drift_->velocity * lost_s};
   drift_.reset();
 }
@@ -350,9 +355,7 @@ std::optional<MotionPrediction> MapTracker::PredictMotion(const FrameView& view)
   return interval_s > 0.0 ? motion_.Predict(interval_s) : std::nullopt;
 }
 
-double MapTracker::SinceLast(const FrameView& view) const {
-  return 1e-6 * static_cast<double>(view.features().utime_us - last_->frame.view->features().utime_us);
-}
+double MapTracker::SinceLast(const FrameView& view) const { return SecondsBetween(*last_->frame.view, view); }
 
 Sim3 MapTracker::WorldFromReference() const { return replica_.WorldFromKeyframe(reference_).value_or(Sim3{}); }
 

@@ -32,6 +32,12 @@ void MotionModel::LearnNoise(const Eigen::Vector3d& measured, double interval_s)
   change_ = change;
 }
 
+void MotionModel::Guess(const Rigid3& last_from_current, double interval_s) {
+  velocity_ = HalfOf(last_from_current.rotation).conjugate() * last_from_current.translation / interval_s;
+  turn_rate_ = LogSO3(last_from_current.rotation) / interval_s;
+  is_known_ = true;
+}
+
 void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s,
                       bool is_carried) {
   const Eigen::Matrix3d middle_from_last = HalfOf(last_from_current.rotation).toRotationMatrix().transpose();
@@ -39,6 +45,7 @@ void MotionModel::Add(const Rigid3& last_from_current, const Eigen::Matrix3d& co
   const Eigen::Matrix3d variance =
       middle_from_last * covariance * middle_from_last.transpose() / (interval_s * interval_s);
   const Eigen::Vector3d turn_rate = LogSO3(last_from_current.rotation) / interval_s;
+  is_known_ = true;
   ++num_motions_;
   if (num_motions_ > 1) {
     const double squared_change = (turn_rate - turn_rate_).squaredNorm() / 3.0;
@@ -68,7 +75,7 @@ std::optional<MotionPrediction> MotionModel::Predict(double interval_s) const {
 
 std::optional<MotionPrediction> MotionModel::Predict(double interval_s,
                                                      const Eigen::Quaterniond& last_from_current) const {
-  if (num_motions_ == 0) return std::nullopt;
+  if (!is_known_) return std::nullopt;
   const Eigen::Matrix3d variance = variance_ + walk_ * interval_s * Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d last_from_middle = HalfOf(last_from_current).toRotationMatrix();
   MotionPrediction prediction;

@@ -37,11 +37,15 @@ class MotionModel {
   // `is_carried`: the prediction took part in it, so that it tells nothing new about q and r.
   void Add(const Rigid3& last_from_current, const Eigen::Matrix3d& covariance, double interval_s,
            bool is_carried = false);
-  // nullopt before the first motion. The camera turns on as it did, or by `last_from_current`, if that is known.
+  // Before the first motion: about so, over `interval_s` > 0, which says where to look and nothing of q and r.
+  void Guess(const Rigid3& last_from_current, double interval_s);
+  // nullopt before the first motion or guess. The camera turns on as it did, or by `last_from_current`, if that is
+  // known.
   std::optional<MotionPrediction> Predict(double interval_s) const;
   std::optional<MotionPrediction> Predict(double interval_s, const Eigen::Quaterniond& last_from_current) const;
-  // How the camera moved in the middle of the last step, in its axes then, filtered; unknown before the first motion.
-  bool is_known() const { return num_motions_ > 0; }
+  // How the camera moved in the middle of the last step, in its axes then, filtered; unknown before the first motion
+  // or guess.
+  bool is_known() const { return is_known_; }
   const Eigen::Vector3d& velocity() const { return velocity_; }    // units/s
   const Eigen::Vector3d& turn_rate() const { return turn_rate_; }  // rad/s
 
@@ -49,6 +53,7 @@ class MotionModel {
   void LearnNoise(const Eigen::Vector3d& measured, double interval_s);
   double MemoryShare(double interval_s) const;
 
+  bool is_known_ = false;
   int num_motions_ = 0;
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();   // units/s
   Eigen::Matrix3d variance_ = Eigen::Matrix3d::Zero();   // of it

@@ -26,6 +26,24 @@ MotionModel Driven(double step, double noise = 1e-3, int num = 30) {
 
 TEST(MotionModel, PredictsNothingBeforeTheFirstMotion) { EXPECT_FALSE(MotionModel().Predict(kInterval)); }
 
+// What two views show before there is a map says where to look first; what the camera does then counts alone.
+TEST(MotionModel, AGuessLeadsUntilTheFirstMotion) {
+  MotionModel guessed, other;
+  guessed.Guess({ExpSO3({0.0, 0.04, 0.0}), {0.0, 0.0, 1.0}}, 2.0 * kInterval);
+  const auto motion = guessed.Predict(kInterval);
+  ASSERT_TRUE(motion);
+  EXPECT_NEAR(motion->last_from_current.translation.norm(), 0.5, 1e-12);
+  EXPECT_NEAR(LogSO3(motion->last_from_current.rotation).y(), 0.02, 1e-12);
+  EXPECT_FALSE(motion->is_steady);
+  for (MotionModel* model : {&guessed, &other}) {
+    model->Add({Eigen::Quaterniond::Identity(), {0.3, 0.0, 0.0}}, kCovariance, kInterval);
+    model->Add({Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0}}, kCovariance, kInterval);
+  }
+  EXPECT_EQ(guessed.Predict(kInterval)->last_from_current.translation,
+            other.Predict(kInterval)->last_from_current.translation);
+  EXPECT_EQ(guessed.Predict(kInterval)->covariance, other.Predict(kInterval)->covariance);
+}
+
 // 0.5 along a turn of 0.02 rad each: after n motions n / 2 away on a circle, in the direction of its chord.
 TEST(MotionModel, GoesOnInTimeNotInFrames) {
   const MotionModel model = Driven(0.5, 0.0);
