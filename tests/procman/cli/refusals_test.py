@@ -62,7 +62,7 @@ def test_paths_with_umlauts_in_any_locale(
 ) -> None:
     out = tmp_path / "Straße in München"
     shutil.copytree(sequence, tmp_path / "übung")
-    options = ("--frames", "0:5", "--extractors", 1, "--port", tessera.next_port(), "--out", out)
+    options = ("--frames", "0:20", "--extractors", 1, "--port", tessera.next_port(), "--out", out)
     finished = run_in('exec "$@"', "run", f"kitti:{tmp_path / 'übung'}", *options, **variables)
     assert finished.returncode == 0, finished.stderr
     assert "übung" in (out / "report.html").read_text()
