@@ -74,24 +74,21 @@ std::optional<Eigen::Matrix3d> SampleModel(const TwoViewProblem& problem, uint64
   return best;
 }
 
-// The point of a pair, if it lies in front of both cameras, projects near both pixels, and has enough parallax.
-std::optional<Eigen::Vector3d> GoodPoint(const TwoViewProblem& problem, const Rigid3& motion, const RayPair& pair) {
+// The point of a pair, if it lies in front of both cameras.
+std::optional<Eigen::Vector3d> PointInFront(const Rigid3& motion, const RayPair& pair) {
   const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
-  if (!point || point->z() <= 0.0) {
-    return std::nullopt;
-  }
-  const Eigen::Vector3d in_second = motion * *point;
-  if (in_second.z() <= 0.0) {
-    return std::nullopt;
-  }
-  const double error_first = (point->head<2>() / point->z() - pair.first.head<2>()).squaredNorm();
+  const bool is_in_front = point && point->z() > 0.0 && (motion * *point).z() > 0.0;
+  return is_in_front ? point : std::nullopt;
+}
+
+// Whether a point in front of both cameras projects near both pixels, and has enough parallax.
+bool IsGood(const TwoViewProblem& problem, const Rigid3& motion, const RayPair& pair, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d in_second = motion * point;
+  const double error_first = (point.head<2>() / point.z() - pair.first.head<2>()).squaredNorm();
   const double error_second = (in_second.head<2>() / in_second.z() - pair.second.head<2>()).squaredNorm();
   const double limit = problem.limit_squared * Chi2Limit(false) / kChi2LimitOfOne;  // two degrees of freedom
-  const double cosine = CosParallax(*point, Eigen::Vector3d::Zero(), motion.Inverse().translation);
-  if (error_first > limit || error_second > limit || cosine > std::cos(problem.options.min_parallax_rad)) {
-    return std::nullopt;
-  }
-  return point;
+  const double cosine = CosParallax(point, Eigen::Vector3d::Zero(), motion.Inverse().translation);
+  return error_first <= limit && error_second <= limit && cosine <= std::cos(problem.options.min_parallax_rad);
 }
 
 // Refines the motion on the pairs that agree with it, twice, since a better motion finds more of them.
@@ -115,33 +112,33 @@ RefinedMotion RefineOnInliers(const TwoViewProblem& problem, const Rigid3& motio
 // Squared error of a pair, in ray units: of the nearest pair that a point in front of both cameras, or at infinity,
 // allows. Where the epipolar constraint puts the point behind a camera, that is the point at infinity, R x1: noise
 // alone puts every other point of the sky there. (The difference of two views has twice the variance of one.)
-double ErrorSquared(const Rigid3& motion, const Eigen::Matrix3d& essential, const RayPair& pair, double limit_squared) {
+double ErrorSquared(const Rigid3& motion, const Eigen::Matrix3d& essential, const RayPair& pair, bool is_in_front) {
   const double distance = SampsonDistance(essential, pair);
-  if (distance * distance >= limit_squared) {
-    return limit_squared;
-  }
-  const std::optional<Eigen::Vector3d> point = TriangulateRays(motion, pair.first, pair.second);
-  if (point && point->z() > 0.0 && (motion * *point).z() > 0.0) {
+  if (is_in_front) {
     return distance * distance;
   }
   const Eigen::Vector3d at_infinity = motion.rotation * pair.first;
   if (!(at_infinity.z() > 0.0)) {
-    return limit_squared;
+    return std::numeric_limits<double>::infinity();
   }
-  return 0.5 * (at_infinity.hnormalized() - pair.second.hnormalized()).squaredNorm();
+  const double at_infinity_squared = 0.5 * (at_infinity.hnormalized() - pair.second.hnormalized()).squaredNorm();
+  return std::max(distance * distance, at_infinity_squared);
 }
 
 // Points that are too far for parallax count in the cost like others: the motion that puts most points near is not
 // therefore the true one.
 Candidate Evaluate(const TwoViewProblem& problem, const RefinedMotion& motion) {
+  const Rigid3& second_from_first = motion.second_from_first;
+  const Eigen::Matrix3d essential = EssentialFromMotion(second_from_first);
   Candidate candidate{.motion = motion};
   candidate.points.reserve(problem.rays.size());
   candidate.errors.reserve(problem.rays.size());
-  const Eigen::Matrix3d essential = EssentialFromMotion(motion.second_from_first);
   for (const RayPair& pair : problem.rays) {
-    candidate.points.push_back(GoodPoint(problem, motion.second_from_first, pair));
-    candidate.num_points += candidate.points.back().has_value() ? 1 : 0;
-    const double error_squared = ErrorSquared(motion.second_from_first, essential, pair, problem.limit_squared);
+    const std::optional<Eigen::Vector3d> point = PointInFront(second_from_first, pair);
+    const bool is_good = point && IsGood(problem, second_from_first, pair, *point);
+    candidate.points.push_back(is_good ? point : std::nullopt);
+    candidate.num_points += is_good ? 1 : 0;
+    const double error_squared = ErrorSquared(second_from_first, essential, pair, point.has_value());
     candidate.errors.push_back(std::min(1.0, error_squared / problem.limit_squared));
     candidate.cost += candidate.errors.back();
   }

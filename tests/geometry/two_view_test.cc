@@ -142,7 +142,7 @@ TEST(EstimateTwoView, RefusesTooLittleParallaxAndTooFewPairs) {
   const Rigid3 small{kSideways.rotation, 0.01 * kSideways.translation};
   EXPECT_FALSE(Estimate(Scene::kGeneral, small, 0.5, 0).has_value());
   const auto points = MakePoints(Scene::kGeneral, kSideways, 20);
-  EXPECT_FALSE(EstimateClear(MakePairs(points, kSideways, 0.0, 0), 5, {}).has_value());
+  EXPECT_FALSE(EstimateTwoView(MakeCamera(), MakePairs(points, kSideways, 0.0, 0), 5, {}).has_value());
 }
 
 TEST(EstimateTwoView, SameSeedGivesTheSameBits) {
