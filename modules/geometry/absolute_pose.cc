@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <utility>
 
+#include "geometry/pose_optimization.h"
 #include "geometry/reprojection.h"
 #include "geometry/sampling.h"
 
 namespace tessera {
 namespace {
+
+constexpr int kMinToRefine = 6;  // points: fewer hardly say more than the three that made the pose
 
 // The four eigenvalues of a 4x4 matrix with zeros below its subdiagonal (a Hessenberg matrix).
 std::array<std::complex<double>, 4> EigenvaluesOfHessenberg(const Eigen::Matrix4d& matrix) {
@@ -104,6 +108,23 @@ int CountInliers(const CameraCalibration& calibration, std::span<const PointPixe
   return num_inliers;
 }
 
+// The best pose by the points that agree with `pose`.
+AbsolutePose Refined(const CameraCalibration& calibration, std::span<const PointPixel> points,
+                     const AbsolutePose& pose) {
+  std::vector<PoseObservation> observations;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!pose.is_inlier[i]) continue;
+    PixelObservation seen;
+    seen.pixel_px = points[i].pixel_px;
+    seen.sigma_px = points[i].sigma_px;
+    observations.push_back({.point_in_world = points[i].point_in_world, .seen = seen});
+  }
+  AbsolutePose refined{OptimizePose(calibration, 0.0, observations, pose.camera_from_world, {}).camera_from_world,
+                       std::vector<char>(points.size()), 0};
+  refined.num_inliers = CountInliers(calibration, points, refined.camera_from_world, refined.is_inlier);
+  return refined;
+}
+
 }  // namespace
 
 std::vector<Rigid3> PosesFromThreePoints(const std::array<Eigen::Vector3d, 3>& points_in_world,
@@ -159,6 +180,11 @@ std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibr
       }
     }
   });
+  for (int i = 0; i < options.max_refinements && best.num_inliers >= kMinToRefine; ++i) {
+    AbsolutePose refined = Refined(calibration, points, best);
+    if (refined.num_inliers <= best.num_inliers) break;
+    best = std::move(refined);
+  }
   return best.num_inliers >= options.min_inliers ? std::optional(best) : std::nullopt;
 }
 

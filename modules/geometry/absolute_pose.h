@@ -28,6 +28,7 @@ std::vector<Rigid3> PosesFromThreePoints(const std::array<Eigen::Vector3d, 3>& p
 struct AbsolutePoseOptions {
   int ransac_iterations = 200;  // three good of three are met with 99 % even at 30 % good matches
   int min_inliers = 12;         // fewer may agree by chance
+  int max_refinements = 5;
 };
 
 struct AbsolutePose {
@@ -36,8 +37,9 @@ struct AbsolutePose {
   int num_inliers = 0;
 };
 
-// RANSAC over triples; the winner has most points within the chi-square limit of their pixel. It is not refined.
-// nullopt if that is fewer than min_inliers. `seed` decides the samples.
+// RANSAC over triples; the winner has most points within the chi-square limit of their pixel. Three pixels fix a pose
+// to some of their noise only, so it is refined over all that agree, as long as that makes more agree (locally
+// optimized RANSAC, Chum et al. 2003). nullopt if these are fewer than min_inliers. `seed` decides the samples.
 std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibration,
                                                  std::span<const PointPixel> points, uint64_t seed,
                                                  const AbsolutePoseOptions& options);

@@ -141,6 +141,10 @@ std::optional<FoundFrame> FrameSearch::SearchAnywhere() const {
   const auto pose = EstimateAbsolutePose(frame.view->calibration(), pairs, seed, {});
   if (!pose) return std::nullopt;
   frame.world_from_camera = pose->camera_from_world.Inverse();
+  // Most of what descriptors alone match may be wrong, and would pull the pose away before it is told apart.
+  for (size_t i = 0, pair = 0; i < frame.points.size(); ++i) {
+    if (frame.points[i].valid() && !pose->is_inlier[pair++]) frame.points[i] = {};
+  }
   if (OptimizeFrame(options_.pose, frame) < options_.min_last_matches / 2) return std::nullopt;
   const bool is_wide = IsWide(frame);
   return FoundFrame{std::move(frame), is_wide, true};

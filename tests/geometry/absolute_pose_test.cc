@@ -39,6 +39,20 @@ TEST(EstimateAbsolutePose, FindsThePoseAmongWrongMatches) {
   EXPECT_GE(pose->num_inliers, 40);
 }
 
+TEST(EstimateAbsolutePose, IsMoreExactThanThreePixels) {
+  const std::vector<PointPixel> seen = MakeSeen(1.0, 2);
+  double error = 0.0, error_of_three = 0.0;
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    const auto pose = EstimateAbsolutePose(MakeCamera(), seen, seed, {});
+    const auto of_three = EstimateAbsolutePose(MakeCamera(), seen, seed, {.max_refinements = 0});
+    ASSERT_TRUE(pose.has_value() && of_three.has_value());
+    EXPECT_GE(pose->num_inliers, of_three->num_inliers);
+    error += (pose->camera_from_world.translation - kTruth.translation).norm();
+    error_of_three += (of_three->camera_from_world.translation - kTruth.translation).norm();
+  }
+  EXPECT_LT(error, 0.7 * error_of_three);
+}
+
 TEST(EstimateAbsolutePose, GivesNothingWhereNothingAgrees) {
   EXPECT_FALSE(EstimateAbsolutePose(MakeCamera(), MakeSeen(0.0, 1), 3, {}).has_value());
   EXPECT_FALSE(EstimateAbsolutePose(MakeCamera(), {}, 3, {}).has_value());

@@ -95,6 +95,18 @@ TEST_F(FrameSearchTest, FindsAFrameAnywhereByDescriptorsAlone) {
   EXPECT_THAT(search.FindAnywhere()->frame.world_from_camera, IsNear(truth_, 0.02));
 }
 
+TEST_F(FrameSearchTest, FindsAFrameAnywhereThoughMostMatchesAreWrong) {
+  FeatureFrame features = Take();
+  // Three of four keypoints look like others of them.
+  for (size_t i = 0; i < features.descriptors.size(); ++i) {
+    if (i % 4 != 0) features.keypoints[i].x_px = features.keypoints[(i * 7 + 3) % features.keypoints.size()].x_px;
+  }
+  FrameSearch search(ViewOf(features), last_, {.world_from_camera = Rigid3{ExpSO3({0.0, 2.0, 0.0}), {9.0, 0.0, 0.0}}},
+                     replica_, options_);
+  ASSERT_TRUE(search.FindAnywhere().has_value());
+  EXPECT_THAT(search.FindAnywhere()->frame.world_from_camera, IsNear(truth_, 0.05));
+}
+
 TEST_F(FrameSearchTest, OnlyMonoAsksTwoFramesByThemselves) {
   FrameSearch mono(ViewOf(Take()), last_, {.world_from_camera = truth_}, replica_, options_);
   ASSERT_TRUE(mono.PoseByPair().has_value());
