@@ -136,6 +136,19 @@ class Mapping {
 
 }  // namespace
 
+namespace {
+
+// A frame that can't be placed waits for the answer of a loop closer that has seen all keyframes so far.
+MapTrackingResult TrackOrAsk(MapTracker& tracker, const FeatureFrame& features, OfflineRun& run) {
+  MapTrackingResult result = tracker.Track(features, nullptr, run.loop_closer != nullptr);
+  if (!result.asks_relocalization) return result;
+  const RelocalizationAnswer answer = run.loop_closer->Relocalize({features, tracker.last_keyframe()});
+  run.num_relocalized += answer.reference.valid() ? 1 : 0;
+  return tracker.Track(features, &answer);
+}
+
+}  // namespace
+
 void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& tracker_options, int64_t map_delay_frames,
           OfflineRun& run) {
   MapTracker tracker(tracker_options);
@@ -149,7 +162,7 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
       for (const auto& delta : time.TakeDeltas(features.frame)) {
         ThrowIfFailed<InputError>(tracker.ApplyDelta(*delta));
       }
-      return tracker.Track(features);
+      return TrackOrAsk(tracker, features, run);
     });
     run.poses.push_back(result.pose);
     const bool is_lost = result.pose.state == TrackingState::kLost;

@@ -38,6 +38,7 @@ struct OfflineRun {
   std::vector<PoseEstimate> poses;
   int num_lost = 0;
   int num_failures = 0;                                      // changes from tracked to lost
+  int num_relocalized = 0;                                   // frames that a loop closer has placed
   std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
   // Poses of tracked frames: as known at the time, and after all optimization.

@@ -133,9 +133,9 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
   const bool is_mono = sequence.calibration.sensor == SensorType::kMono;
   const std::map<FrameId, Rigid3> optimized = run.Optimized();
   const Map& map = run.mapper.map();
-  std::printf("frames %zu, tracked %zu from frame %ld, lost %d, failures %d\n", run.poses.size(), optimized.size(),
-              optimized.empty() ? -1L : static_cast<long>(optimized.begin()->first.value), run.num_lost,
-              run.num_failures);
+  std::printf("frames %zu, tracked %zu from frame %ld, lost %d, failures %d, relocalized %d\n", run.poses.size(),
+              optimized.size(), optimized.empty() ? -1L : static_cast<long>(optimized.begin()->first.value),
+              run.num_lost, run.num_failures, run.num_relocalized);
   std::printf("keyframes made %zu, kept %ld, landmarks %ld, map %s\n", run.map_ms.size(),
               static_cast<long>(map.keyframes().size()), static_cast<long>(map.landmarks().size()),
               map.Sha256Hex().c_str());
