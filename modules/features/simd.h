@@ -29,6 +29,8 @@ inline void Store(uint8_t* p, U8x32 a) { _mm256_storeu_si256(reinterpret_cast<__
 inline U8x32 Fill8(uint8_t value) { return {_mm256_set1_epi8(static_cast<char>(value))}; }
 // (a + b) mod 256
 inline U8x32 Add(U8x32 a, U8x32 b) { return {_mm256_add_epi8(a.v, b.v)}; }
+// min(a + b, 255)
+inline U8x32 AddSaturated(U8x32 a, U8x32 b) { return {_mm256_adds_epu8(a.v, b.v)}; }
 // max(a - b, 0)
 inline U8x32 SubtractSaturated(U8x32 a, U8x32 b) { return {_mm256_subs_epu8(a.v, b.v)}; }
 inline U8x32 Min(U8x32 a, U8x32 b) { return {_mm256_min_epu8(a.v, b.v)}; }
@@ -98,6 +100,7 @@ inline void Store(uint8_t* p, U8x32 a) {
 }
 inline U8x32 Fill8(uint8_t value) { return {vdupq_n_u8(value), vdupq_n_u8(value)}; }
 inline U8x32 Add(U8x32 a, U8x32 b) { return {vaddq_u8(a.low, b.low), vaddq_u8(a.high, b.high)}; }
+inline U8x32 AddSaturated(U8x32 a, U8x32 b) { return {vqaddq_u8(a.low, b.low), vqaddq_u8(a.high, b.high)}; }
 inline U8x32 SubtractSaturated(U8x32 a, U8x32 b) { return {vqsubq_u8(a.low, b.low), vqsubq_u8(a.high, b.high)}; }
 inline U8x32 Min(U8x32 a, U8x32 b) { return {vminq_u8(a.low, b.low), vminq_u8(a.high, b.high)}; }
 inline U8x32 Max(U8x32 a, U8x32 b) { return {vmaxq_u8(a.low, b.low), vmaxq_u8(a.high, b.high)}; }
@@ -198,6 +201,9 @@ inline U8x32 Fill8(uint8_t value) {
 }
 inline U8x32 Add(U8x32 a, U8x32 b) {
   return Map8([&](int i) { return a.v[i] + b.v[i]; });
+}
+inline U8x32 AddSaturated(U8x32 a, U8x32 b) {
+  return Map8([&](int i) { return a.v[i] + b.v[i] < 255 ? a.v[i] + b.v[i] : 255; });
 }
 inline U8x32 SubtractSaturated(U8x32 a, U8x32 b) {
   return Map8([&](int i) { return a.v[i] > b.v[i] ? a.v[i] - b.v[i] : 0; });

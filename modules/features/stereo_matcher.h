@@ -16,16 +16,22 @@ class StereoMatcher {
   // Position of the pixel (x, y) of the left image in the right image, in 1/64 px of the level, at most max_disparity
   // to the left of x; nullopt if no position matches well, or more than one does. Compares windows of 11 x 11 px by
   //
-  //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, y + j)|, 23),
+  //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, y + j) - difference(p)|, 23)
+  //   difference(p) = mean of the left window - mean of the right one
   //
-  // so that single pixels that differ much (occlusions, highlights) weigh no more than others.
+  // so that single pixels that differ much (occlusions, highlights) weigh no more than others, and the brightness of
+  // the two images doesn't matter (each has its exposure, its lens is darker at the edges).
   // The left image must hold kStereoRadiusPx around (x, y), the right one what LevelPlan::right says.
   std::optional<int> Match(const LevelImage& left, const LevelImage& right, int x, int y, int max_disparity);
 
  private:
   void ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
 
-  std::array<uint16_t, 1120> costs_;  // of the positions first, first + 1, ... of the right image
+  void ComputeDifferences(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
+
+  static constexpr size_t kMaxPositions = 1120;
+  std::array<uint16_t, kMaxPositions> costs_;             // of the positions first, first + 1, ... of the right image
+  std::array<uint8_t, kMaxPositions> brighter_, darker_;  // by how much the left window is, at these positions
 };
 
 }  // namespace tessera

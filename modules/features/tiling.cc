@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/errors.h"
+#include "features/exposure.h"
 #include "features/pyramid.h"
 #include "features/tile_plan.h"
 
@@ -140,6 +141,7 @@ TileGrid ParseTileGrid(const std::string& text) {
 std::vector<TileJob> CutFrame(CameraFrame frame, const CameraCalibration& calibration, int64_t captured_us,
                               TileGrid grid, int coarse_levels_from, const FeatureOptions& options) {
   CheckFrame(frame, calibration, options);
+  if (calibration.sensor == SensorType::kStereo) MatchExposure(frame.left, frame.right);
   const bool is_cut = grid.lines * grid.columns > 1;
   std::vector<TileJob> jobs;
   const auto add = [&](const Rect& core, int first_level, int last_level, bool even_if_idle) {
