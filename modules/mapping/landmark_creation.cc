@@ -56,11 +56,12 @@ std::vector<LandmarkId> CreateFromDepth(KeyframeId id, const CreationOptions& op
   });
   const double max_depth_m = options.max_depth_baselines * Baseline(features.calibration);
   std::vector<LandmarkId> created;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const auto& [keypoint, point_in_camera] = points[i];
-    if (point_in_camera.z() > max_depth_m && i >= static_cast<size_t>(options.min_depth_points)) break;
+  int64_t num_seen = std::ranges::count_if(keyframe.landmarks, &LandmarkId::valid);
+  for (const auto& [keypoint, point_in_camera] : points) {
+    if (point_in_camera.z() > max_depth_m && num_seen >= options.min_depth_points) break;
     if (!keyframe.landmarks[Index(keypoint)].valid()) {
       created.push_back(AddLandmark(keyframe.world_from_camera * point_in_camera, {{id, keypoint}}, editor));
+      ++num_seen;
     }
   }
   return created;

@@ -42,6 +42,7 @@ struct MapTrackerOptions {
   bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
   int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
   double max_depth_baselines = 40.0;  // stereo, RGB-D: up to here a keypoint's depth makes a point at once
+  int min_depth_points = 1000;        // and beyond, nearest first, while the frame sees fewer points than this
 
   Result<> Check() const;
 };
