@@ -26,12 +26,11 @@ class StereoMatcher {
 
  private:
   void ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
-
   void ComputeDifferences(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
 
   static constexpr size_t kMaxPositions = 1120;
-  std::array<uint16_t, kMaxPositions> costs_;             // of the positions first, first + 1, ... of the right image
-  std::array<uint8_t, kMaxPositions> brighter_, darker_;  // by how much the left window is, at these positions
+  std::array<uint16_t, kMaxPositions> costs_;  // of the positions first, first + 1, ... of the right image
+  std::array<uint8_t, kMaxPositions> brighter_{}, darker_{};  // by how much the left window is, at these positions
 };
 
 }  // namespace tessera

@@ -87,7 +87,7 @@ TEST(MatchExposure, TakesBackWhatAnotherGainDid) {
 
 TEST(MatchExposure, LeavesWhatSaysNothing) {
   const GrayImage left = MakeTexture(320, 200, 6);
-  for (const uint8_t value : {0, 90, 255}) {
+  for (const uint8_t value : {uint8_t{0}, uint8_t{90}, uint8_t{255}}) {
     GrayImage flat = MakeFlat(320, 200, value);
     MatchExposure(left, flat);
     EXPECT_EQ(flat, MakeFlat(320, 200, value));

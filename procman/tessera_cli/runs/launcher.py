@@ -45,6 +45,7 @@ from tessera_cli.runs.summary import (
     is_trustworthy,
     occupancy_warnings,
     recording_warnings,
+    why_nothing_was_located,
     write_summary,
 )
 from tessera_cli.settings import Settings, write_settings
@@ -230,7 +231,7 @@ class Launcher:
         result = self._summarize(self._wall_s(began), ended)
         print(self._present(result, self._folder))
         if not result.summary["frames_tracked"]:
-            raise RunError(self._why_nothing_was_located(result.summary["frames"]))
+            raise RunError(why_nothing_was_located(result.summary, self._arguments.localize_only))
         # A live source has no end of its own: to interrupt it is the ordinary way.
         said = result.summary["ended"]
         ended_well = said == "complete" or (said == "interrupted" and self._source.is_live)
@@ -240,12 +241,6 @@ class Launcher:
         """Stages know the map that was loaded by its name in the run's folder; people by the one that they gave."""
         given = loaded_map(self._arguments)
         return sentence.replace(str(self._folder / LOADED_MAP), str(given)) if given else sentence
-
-    def _why_nothing_was_located(self, num_frames: int) -> str:
-        said = f"no pose was found for any of {num_frames} frames"
-        if self._arguments.localize_only:
-            return f"{said}: is the map of this place, and of this camera?"
-        return f"{said}: is the camera moving, are its images sharp, and is its calibration right?"
 
     @property
     def has_poses(self) -> bool:

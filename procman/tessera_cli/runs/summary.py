@@ -122,6 +122,21 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
     return replace(result, summary=summary)
 
 
+def why_nothing_was_located(summary: Summary, in_a_map: bool) -> str:
+    """Of a run without a single pose: what its user should look at. `in_a_map`: it looked for places of a map only."""
+    said = f"no pose was found for any of {summary['frames']} frames"
+    if in_a_map:
+        return f"{said}: is the map of this place, and of this camera?"
+    if summary.get("sensor") == "stereo":
+        return (
+            f"{said}: hardly a point of the left images was found in the right ones; are the two of the same moment, "
+            "not exchanged, sharp, and is their calibration right?"
+        )
+    if summary.get("sensor") == "rgbd":
+        return f"{said}: do the depth images hold depths, in the calibration's unit, and are the others sharp?"
+    return f"{said}: is the camera moving, are its images sharp, and is its calibration right?"
+
+
 def is_trustworthy(summary: Summary) -> bool:
     """Nothing of the run is missing, and its scale is not in doubt."""
     return not summary["not_written"] and not summary["doubts"]

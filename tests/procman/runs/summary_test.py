@@ -19,6 +19,7 @@ from tessera_cli.runs.summary import (
     recording_warnings,
     scale_doubts,
     scale_warnings,
+    why_nothing_was_located,
 )
 from tessera_cli.supervision.progress import FINISHED, RUNNING, Progress, StageReport, to_report
 
@@ -209,3 +210,13 @@ def test_a_run_ends_when_all_that_write_its_files_have() -> None:
         is_finished.append(progress.is_finished)
     assert is_finished == [True, False, True]
     assert not Progress().is_finished
+
+
+def test_a_run_without_a_pose_says_what_to_look_at() -> None:
+    said = {
+        sensor: why_nothing_was_located({"frames": 9, "sensor": sensor}, in_a_map=False)
+        for sensor in ("mono", "stereo", "rgbd")
+    }
+    assert all(sentence.startswith("no pose was found for any of 9 frames: ") for sentence in said.values())
+    assert "exchanged" in said["stereo"] and "depth images" in said["rgbd"] and "moving" in said["mono"]
+    assert "map of this place" in why_nothing_was_located({"frames": 9, "sensor": "stereo"}, in_a_map=True)
