@@ -37,32 +37,16 @@ void CreateFromPair(KeyframeId id, KeyframeId other_id, const EpipolarSearch& se
 Result<> CreationOptions::Check() const {
   if (max_neighbors < 1) return Failed("new landmarks need at least one neighbor to be searched");
   if (!(min_baseline_share > 0.0)) return Failed("the least baseline of new landmarks must be positive");
+  TESSERA_RETURN_IF_FAILED(depth.Check());
   return matching.Check();
 }
 
 std::vector<LandmarkId> CreateFromDepth(KeyframeId id, const CreationOptions& options, MapEditor& editor) {
   const Keyframe& keyframe = *editor.map().FindKeyframe(id);
-  const FeatureFrame& features = *keyframe.features;
-  struct DepthPoint {
-    int32_t keypoint;
-    Eigen::Vector3d point_in_camera;
-  };
-  std::vector<DepthPoint> points;
-  for (int32_t i = 0; i < static_cast<int32_t>(features.keypoints.size()); ++i) {
-    if (const auto point = PointFromDepth(features, i)) points.push_back({i, *point});
-  }
-  std::stable_sort(points.begin(), points.end(), [](const DepthPoint& a, const DepthPoint& b) {
-    return a.point_in_camera.z() < b.point_in_camera.z();
-  });
-  const double max_depth_m = options.max_depth_baselines * Baseline(features.calibration);
+  const auto sees_known = [&keyframe](int32_t i) { return keyframe.landmarks[Index(i)].valid(); };
   std::vector<LandmarkId> created;
-  int64_t num_seen = std::ranges::count_if(keyframe.landmarks, &LandmarkId::valid);
-  for (const auto& [keypoint, point_in_camera] : points) {
-    if (point_in_camera.z() > max_depth_m && num_seen >= options.min_depth_points) break;
-    if (!keyframe.landmarks[Index(keypoint)].valid()) {
-      created.push_back(AddLandmark(keyframe.world_from_camera * point_in_camera, {{id, keypoint}}, editor));
-      ++num_seen;
-    }
+  for (const auto& [keypoint, point_in_camera] : NewDepthPoints(*keyframe.features, sees_known, options.depth)) {
+    created.push_back(AddLandmark(keyframe.world_from_camera * point_in_camera, {{id, keypoint}}, editor));
   }
   return created;
 }

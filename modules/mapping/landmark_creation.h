@@ -6,6 +6,7 @@
 #include "core/result.h"
 #include "map/map_editor.h"
 #include "matching/epipolar_search.h"
+#include "measurement/depth_points.h"
 
 namespace tessera {
 
@@ -13,11 +14,7 @@ struct CreationOptions {
   int max_neighbors = 10;  // keyframes searched for a second view, most shared landmarks first
   EpipolarOptions matching;
   double min_baseline_share = 0.01;  // mono: a neighbor must be this part of the median depth away
-  double max_depth_baselines =
-      40.0;  // a depth of up to this many baselines is good enough by itself (ORB-SLAM2: 35, 40)
-  // And any depth is while the keyframe sees fewer landmarks than this, nearest first. What isn't known of it counts
-  // (Landmark::depth_sigma), and where the camera turns and walks on, far points are all that two images share.
-  int min_depth_points = 1000;
+  DepthPointOptions depth;
 
   // Fails if a value is out of range.
   Result<> Check() const;

@@ -78,7 +78,7 @@ Result<> MapTrackerOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(search.Check());
   TESSERA_RETURN_IF_FAILED(keyframes.Check());
   TESSERA_RETURN_IF_FAILED(Require(max_unanswered_keyframes >= 2, "max_unanswered_keyframes must be at least 2"));
-  TESSERA_RETURN_IF_FAILED(Require(min_depth_points >= 0, "min_depth_points must not be negative"));
+  TESSERA_RETURN_IF_FAILED(depth.Check());
   return Require(min_inliers >= 6, "min_inliers must be at least 6");
 }
 
@@ -540,7 +540,7 @@ bool MapTracker::NoteLoss(int64_t utime_us) {
 
 bool MapTracker::IsKeyframeDue() {
   const TrackedFrame& frame = last_->frame;
-  const double near_m = options_.max_depth_baselines * frame.view->baseline_m();
+  const double near_m = options_.depth.max_baselines * frame.view->baseline_m();
   KeyframeDecision::NearKeypoints near;
   for (int i = 0; near_m > 0.0 && i < frame.view->size(); ++i) {
     const auto point = PointFromDepth(frame.view->features(), i);
@@ -622,23 +622,13 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   return keyframe;
 }
 
-// Until the mapper answers, keypoints with depth are points of their own: as in the mapper (CreateFromDepth), the near
-// ones, and farther ones where the frame sees few points.
+// Until the mapper answers, keypoints with depth are points of their own.
 void MapTracker::AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const {
-  const double max_depth_m = options_.max_depth_baselines * frame.view->baseline_m();
-  std::vector<std::pair<double, int>> by_depth;
-  for (int i = 0; i < frame.view->size(); ++i) {
-    if (const auto point = PointFromDepth(frame.view->features(), i)) by_depth.emplace_back(point->z(), i);
-  }
-  std::ranges::sort(by_depth);
-  int num_points = frame.NumPoints();
-  for (const auto& [depth_m, i] : by_depth) {
-    if (depth_m > max_depth_m && num_points >= options_.min_depth_points) break;
-    if (frame.points[Index(i)].valid()) continue;
-    const Landmark in_camera = PointOf(*frame.view, i, *PointFromDepth(frame.view->features(), i));
-    sent.points[i] = in_camera;
-    frame.points[Index(i)] = {{{}, id, i}, InWorld(Sim3::From(frame.world_from_camera), in_camera)};
-    ++num_points;
+  const auto sees_known = [&frame](int32_t i) { return frame.points[Index(i)].valid(); };
+  for (const auto& [keypoint, point] : NewDepthPoints(frame.view->features(), sees_known, options_.depth)) {
+    const Landmark in_camera = PointOf(*frame.view, keypoint, point);
+    sent.points[keypoint] = in_camera;
+    frame.points[Index(keypoint)] = {{{}, id, keypoint}, InWorld(Sim3::From(frame.world_from_camera), in_camera)};
   }
 }
 

@@ -3,7 +3,7 @@
 //
 // The last frame's points are matched around a constant-velocity prediction, then the landmarks of the local keyframes;
 // after each, the pose is optimized over the matches. Between a keyframe and the delta that answers it, the points that
-// the tracker triangulated itself are used: mono's first ones, and near ones with depth.
+// the tracker triangulated itself are used: mono's first ones, and those with depth.
 #pragma once
 
 #include <cmath>
@@ -15,6 +15,7 @@
 
 #include "core/result.h"
 #include "geometry/pose_optimization.h"
+#include "measurement/depth_points.h"
 #include "messages/loop_types.h"
 #include "messages/tracking_types.h"
 #include "tracking/frame_search.h"
@@ -41,8 +42,7 @@ struct MapTrackerOptions {
   int64_t max_unlocated_us = 0;      // the same before the first pose in a map that was loaded, if that is longer
   bool makes_keyframes = true;       // false: the map is used as it is, and no part is begun
   int max_unanswered_keyframes = 8;  // live: a mapper that is far behind isn't helped by more of them
-  double max_depth_baselines = 40.0;  // stereo, RGB-D: up to here a keypoint's depth makes a point at once
-  int min_depth_points = 1000;        // and beyond, nearest first, while the frame sees fewer points than this
+  DepthPointOptions depth;           // stereo, RGB-D: which keypoints make points at once
 
   Result<> Check() const;
 };

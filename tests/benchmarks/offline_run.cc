@@ -134,10 +134,6 @@ class Mapping {
   CorrectionSchedule schedule_;
 };
 
-}  // namespace
-
-namespace {
-
 // A frame that can't be placed waits for the answer of a loop closer that has seen all keyframes so far.
 MapTrackingResult TrackOrAsk(MapTracker& tracker, const FeatureFrame& features, OfflineRun& run) {
   MapTrackingResult result = tracker.Track(features, nullptr, run.loop_closer != nullptr);

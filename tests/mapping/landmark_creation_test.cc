@@ -163,7 +163,7 @@ TEST(CreateFromDepth, AKeypointWithDepthBecomesALandmarkWhereThePointIs) {
   }
 }
 
-// Beyond max_depth_baselines a depth is too uncertain, unless the keyframe sees few landmarks.
+// Beyond max_baselines a depth is too uncertain, unless the keyframe sees few landmarks.
 TEST(CreateFromDepth, FarKeypointsCountOnlyWhereNearOnesAreFew) {
   const auto count_beyond = [](const PartlyKnownMap& world, const std::vector<LandmarkId>& created, double depth_m) {
     int num_beyond = 0;
@@ -171,22 +171,22 @@ TEST(CreateFromDepth, FarKeypointsCountOnlyWhereNearOnesAreFew) {
     return num_beyond;
   };
   PartlyKnownMap rich(SensorType::kStereo, {0}), poor(SensorType::kStereo, {0});
-  const auto near_only = rich.Run(CreateFromDepth, {.max_depth_baselines = 24.0, .min_depth_points = 1});
+  const auto near_only = rich.Run(CreateFromDepth, {.depth = {.max_baselines = 24.0, .min_points = 1}});
   EXPECT_GT(near_only.size(), 10U);
   EXPECT_EQ(count_beyond(rich, near_only, 24.0 * 0.5), 0);
   const auto num_seen = static_cast<int>(
       std::ranges::count_if(poor.map().FindKeyframe({0})->landmarks, [](LandmarkId id) { return id.valid(); }));
-  const auto with_far = poor.Run(CreateFromDepth, {.max_depth_baselines = 0.1, .min_depth_points = num_seen + 60});
+  const auto with_far = poor.Run(CreateFromDepth, {.depth = {.max_baselines = 0.1, .min_points = num_seen + 60}});
   ASSERT_EQ(with_far.size(), 60U);
   double farthest_m = 0.0;
   for (const LandmarkId id : with_far) farthest_m = std::max(farthest_m, poor.Truth(id).z());
   PartlyKnownMap all(SensorType::kStereo, {0});
-  const auto of_all = all.Run(CreateFromDepth, {.max_depth_baselines = 1e6});
+  const auto of_all = all.Run(CreateFromDepth, {.depth = {.max_baselines = 1e6}});
   int num_nearer = 0;
   for (const LandmarkId id : of_all) num_nearer += all.Truth(id).z() < farthest_m - 0.01 ? 1 : 0;
   EXPECT_NEAR(num_nearer, 59, 3) << "the nearest first";
   EXPECT_TRUE(PartlyKnownMap(SensorType::kStereo, {0})
-                  .Run(CreateFromDepth, {.max_depth_baselines = 0.1, .min_depth_points = num_seen})
+                  .Run(CreateFromDepth, {.depth = {.max_baselines = 0.1, .min_points = num_seen}})
                   .empty());
 }
 

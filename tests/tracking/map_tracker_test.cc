@@ -63,13 +63,13 @@ TEST(MapTracker, FollowsAStereoDrive) {
 // Steps of a meter where nothing is near: the farthest points are all that hold the camera.
 TEST(MapTracker, FollowsWhatIsFarWhereNothingIsNear) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
-  for (const int min_depth_points : {0, MapTrackerOptions{}.min_depth_points}) {
-    const MapTrackerOptions options{.max_depth_baselines = 4.0, .min_depth_points = min_depth_points};
+  for (const int min_points : {0, DepthPointOptions{}.min_points}) {
+    const MapTrackerOptions options{.depth = {.max_baselines = 4.0, .min_points = min_points}};
     MapTracker tracker(options);
     const MapTrackingResult first = tracker.Track(world.Take(0).features);
     ASSERT_EQ(first.pose.state, TrackingState::kTracked);
     const MapTrackingResult second = tracker.Track(world.Take(1).features);
-    EXPECT_EQ(second.pose.state == TrackingState::kTracked, min_depth_points > 0);
+    EXPECT_EQ(second.pose.state == TrackingState::kTracked, min_points > 0);
   }
 }
 
