@@ -41,12 +41,12 @@ DispatcherStage::DispatcherStage(StageContext& context)
   context.SetValue("tile_columns", grid.columns);
   context.Every(std::chrono::milliseconds(200), [this] {
     session_.Watch(context_.now_us());
-    GiveWork();
     context_.SetValue("silent_s", 1e-6 * static_cast<double>(session_.SilenceUs(context_.now_us())));
     context_.SetValue("gave_up", session_.has_given_up() ? 1.0 : 0.0);
     context_.SetValue("extractors", session_.queue().num_extractors());
     context_.SetValue("jobs_given_again", static_cast<double>(session_.queue().num_given_again()));
     context_.SetValue("jobs_wanted_whole", static_cast<double>(session_.queue().num_wanted_whole()));
+    GiveWork();  // last: it may end the stream, and STATUS says at once whether the source was given up
   });
 }
 
