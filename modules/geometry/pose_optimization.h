@@ -19,6 +19,7 @@ struct PoseObservation {
   // standard deviation. Zero: the point is exact.
   Eigen::Vector3d depth_sigma_in_world = Eigen::Vector3d::Zero();
   PixelObservation seen;
+  bool votes = true;  // false: it is told whether it agrees with the pose, which it doesn't change
 };
 
 // Where the camera should be by what is known without the images: its center only.

@@ -123,6 +123,7 @@ void PoseProblem::SetLane(Pack& pack, size_t lane, const PoseObservation& observ
   pack.relative_sigma[lane] =
       observation.depth_sigma_in_world.norm() / (observation.point_in_world - camera_in_world).norm();
   pack.is_inlier[lane] = 1.0;
+  pack.votes[lane] = observation.votes ? 1.0 : 0.0;
 }
 
 // As Reproject does it, of
@@ -173,7 +174,7 @@ PoseProblem::Eliminated PoseProblem::Add(const Linearization& linear, const Pack
   const Four &r_x = linear.r_x, &r_z = linear.r_z;
   Eliminated eliminated;
   for (int k = 0; k < 3; ++k) eliminated.point[k] = linear.point[k];
-  eliminated.is_active = linear.is_active * pack.is_inlier;
+  eliminated.is_active = linear.is_active * pack.is_inlier * pack.votes;
   eliminated.curvature = 1.0 + Dot(linear.by_u, linear.by_u);
   eliminated.gradient = Dot(linear.by_u, linear.residual) + pack.u;
   Four(&a)[3] = eliminated.coupling;

@@ -46,6 +46,7 @@ class PoseProblem {
     Four relative_sigma = {};             // of the inverse depth
     Four u = {};                          // standard deviations that the inverse depth is off
     Four is_inlier = {};                  // 1 or 0
+    Four votes = {};                      // 1 or 0: takes no part in steps
   };
   // The whitened residual, by the point in the camera's frame and by u:
   //

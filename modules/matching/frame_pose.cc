@@ -10,23 +10,32 @@ int OptimizeFrame(const PoseOptimizationOptions& options, TrackedFrame& frame) {
 
 PoseOptimizationResult OptimizeFramePose(const PoseOptimizationOptions& options, const PosePrior* prior,
                                          TrackedFrame& frame) {
+  PoseOptimizationResult pose = PoseByPoints(options, prior, frame);
+  TakePose(pose, frame);
+  return pose;
+}
+
+PoseOptimizationResult PoseByPoints(const PoseOptimizationOptions& options, const PosePrior* prior,
+                                    const TrackedFrame& frame, std::span<const char> votes) {
   std::vector<PoseObservation> observations;
-  std::vector<size_t> keypoints;
   for (size_t i = 0; i < frame.points.size(); ++i) {
     if (!frame.points[i].valid()) continue;
     const Landmark& landmark = frame.points[i].landmark;
     observations.push_back({.point_in_world = landmark.position_in_world,
                             .depth_sigma_in_world = landmark.depth_sigma * landmark.normal,
-                            .seen = frame.view->observation(static_cast<int>(i))});
-    keypoints.push_back(i);
+                            .seen = frame.view->observation(static_cast<int>(i)),
+                            .votes = votes.empty() || votes[i] != 0});
   }
-  PoseOptimizationResult result = OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
-                                               frame.world_from_camera.Inverse(), options, prior);
-  frame.world_from_camera = result.camera_from_world.Inverse();
-  for (size_t k = 0; k < keypoints.size(); ++k) {
-    if (!result.is_inlier[k]) frame.points[keypoints[k]] = {};
+  return OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
+                      frame.world_from_camera.Inverse(), options, prior);
+}
+
+void TakePose(const PoseOptimizationResult& pose, TrackedFrame& frame) {
+  frame.world_from_camera = pose.camera_from_world.Inverse();
+  size_t k = 0;
+  for (SeenPoint& point : frame.points) {
+    if (point.valid() && !pose.is_inlier[k++]) point = {};
   }
-  return result;
 }
 
 }  // namespace tessera

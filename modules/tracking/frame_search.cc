@@ -9,6 +9,7 @@
 #include "core/quantile.h"
 #include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
+#include "tracking/confirmed_points.h"
 #include "tracking/local_points.h"
 #include "tracking/pair_motion.h"
 
@@ -86,7 +87,7 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   frame.world_from_camera = world_from_camera;
   const int num = MatchLast(last_, widening * options_.matching.last_radius_px, options_.matching, frame);
   if (num < options_.min_last_matches) return false;
-  const int num_inliers = OptimizeFramePose(options_.pose, prior, frame).num_inliers;
+  const int num_inliers = OptimizeByConfirmed(replica_, options_.pose, prior, frame).num_inliers;
   const Rigid3 found = frame.world_from_camera;
   if (num_inliers > best.num_inliers) {
     best.num_inliers = num_inliers;

@@ -8,6 +8,7 @@
 
 #include "matching/frame_pose.h"
 #include "measurement/landmark_description.h"
+#include "tracking/confirmed_points.h"
 #include "tracking/local_points.h"
 #include "tracking/pair_points.h"
 
@@ -375,15 +376,15 @@ std::optional<PosePrior> MapTracker::PriorOf(const MotionPrediction& motion) con
 MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
   const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
   const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
-  if (!prior) return {OptimizeFramePose(options_.search.pose, nullptr, frame), StepEvidence::kStrong};
+  if (!prior) return {OptimizeByConfirmed(replica_, options_.search.pose, nullptr, frame), StepEvidence::kStrong};
   TrackedFrame carried = frame;
-  const PoseOptimizationResult with_motion = OptimizeFramePose(options_.search.pose, &*prior, carried);
+  const PoseOptimizationResult with_motion = OptimizeByConfirmed(replica_, options_.search.pose, &*prior, carried);
   TrackedFrame seen = carried;
-  PoseOptimizationResult by_images = OptimizeFramePose(options_.search.pose, nullptr, seen);
+  PoseOptimizationResult by_images = OptimizeByConfirmed(replica_, options_.search.pose, nullptr, seen);
   // Unless most points contradict the motion: the camera may have been carried away. That is told, not overruled.
   if (by_images.num_inliers < kMinShareWithMotion * frame.NumPoints()) {
     TrackedFrame alone = frame;
-    const PoseOptimizationResult by_all = OptimizeFramePose(options_.search.pose, nullptr, alone);
+    const PoseOptimizationResult by_all = OptimizeByConfirmed(replica_, options_.search.pose, nullptr, alone);
     if (by_images.num_inliers < kMinShareWithMotion * by_all.num_inliers) {
       by_images = by_all;
       seen = std::move(alone);

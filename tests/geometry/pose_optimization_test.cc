@@ -35,6 +35,23 @@ TEST_P(OptimizePoseTest, RecoversThePoseAndNamesTheOutliers) {
 
 INSTANTIATE_TEST_SUITE_P(MonoAndStereo, OptimizePoseTest, testing::Bool());
 
+// Nine in ten points agree on another pose, but those that vote don't.
+TEST(OptimizePose, OnlyThoseThatVoteMoveThePose) {
+  const Rigid3 truth{ExpSO3({0.02, -0.1, 0.03}), {0.4, -0.2, 0.6}};
+  const Rigid3 other{truth.rotation, truth.translation + Eigen::Vector3d(0.3, 0.0, 0.0)};
+  const auto points = MakePoints(Scene::kGeneral, truth, 200);
+  std::vector<PoseObservation> observations;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const bool votes = i % 10 == 0;
+    observations.push_back({.point_in_world = points[i],
+                            .seen = SeePoint((votes || i % 10 == 1 ? truth : other) * points[i], true),
+                            .votes = votes});
+  }
+  const PoseOptimizationResult result = OptimizePose(MakeCamera(), kViewBaseline, observations, other, {});
+  EXPECT_THAT(result.camera_from_world, IsNear(truth, 1e-6));
+  EXPECT_EQ(result.num_inliers, 40) << "those that don't vote are told apart, too";
+}
+
 TEST(OptimizePose, InformationIsTheCurvatureOfTheCost) {
   const Rigid3 truth{ExpSO3({0.02, -0.1, 0.03}), {0.4, -0.2, 0.6}};
   std::vector<PoseObservation> observations;
