@@ -10,6 +10,7 @@ import numpy as np
 from tessera_cli.messages import stage_status_t
 from tessera_cli.runs.run_folder import Frames, Result, read_log_warnings, read_source_events
 from tessera_cli.runs.summary import (
+    agreement_warnings,
     drop_warnings,
     is_trustworthy,
     judge_end,
@@ -98,6 +99,21 @@ def test_complete_means_that_every_frame_is_accounted_for() -> None:
     )
     assert "40 frames are not" in judge_end("complete", {"frames": 20, "frames_missing": 40})
     assert judge_end("interrupted", {"frames": 20, "frames_missing": 40}) == "interrupted"
+
+
+def test_a_run_whose_points_do_not_agree_with_its_poses_says_what_may_be_wrong() -> None:
+    matches = np.concatenate([[np.nan, 0.0], np.full(98, 500.0)])
+    frames = replace(_frames(100, []), matches=matches, inliers=0.9 * matches)
+    assert agreement_warnings(frames, "stereo") == [] and agreement_warnings(None, "mono") == []
+    poor = replace(frames, inliers=0.7 * matches)
+    (sentence,) = agreement_warnings(poor, "stereo")
+    assert "at most 70 %" in sentence and "same moment" in sentence and "calibration" in sentence
+    (sentence,) = agreement_warnings(poor, "mono")
+    assert "same moment" not in sentence and "depths" not in sentence
+    some = np.where(np.arange(100) < 40, 0.5, 0.9)
+    assert agreement_warnings(replace(frames, inliers=some * matches), "mono") == [], "a hard stretch is none"
+    few = replace(poor, matches=np.where(np.arange(100) < 20, matches, 0.0))
+    assert agreement_warnings(few, "mono") == []
 
 
 def _live_result(latency_ms: np.ndarray, source: str = "kitti:/x", newest_wins: bool = True) -> Result:
