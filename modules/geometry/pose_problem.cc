@@ -92,13 +92,19 @@ PoseProblem::PoseProblem(const CameraCalibration& calibration, double baseline_m
     : prior_(prior),
       calibration_(calibration),
       baseline_m_(baseline_m),
-      num_observations_(observations.size()),
+      lane_of_(observations.size()),
       packs_((observations.size() + kLanes - 1) / kLanes),
       eliminated_(packs_.size()) {
   const Eigen::Vector3d camera_in_world = camera_from_world.Inverse().translation;
   for (Pack& pack : packs_) pack.chi2_limit -= 1.0;
-  for (size_t i = 0; i < observations.size(); ++i) {
-    SetLane(packs_[i / kLanes], i % kLanes, observations[i], camera_in_world);
+  size_t next_lane = 0;
+  for (const bool votes : {true, false}) {
+    for (size_t i = 0; i < observations.size(); ++i) {
+      if (observations[i].votes != votes) continue;
+      lane_of_[i] = next_lane++;
+      SetLane(packs_[lane_of_[i] / kLanes], lane_of_[i] % kLanes, observations[i], camera_in_world);
+    }
+    if (votes) num_voting_packs_ = (next_lane + kLanes - 1) / kLanes;
   }
 }
 
@@ -211,7 +217,7 @@ PoseProblem::Eliminated PoseProblem::Add(const Linearization& linear, const Pack
 std::optional<PoseProblem::Vector6d> PoseProblem::Step(const Rigid3& camera_from_world, Matrix6d* information) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
   NormalEquations equations;
-  for (size_t i = 0; i < packs_.size(); ++i) {
+  for (size_t i = 0; i < num_voting_packs_; ++i) {
     eliminated_[i] = Add(Linearize(rotation, camera_from_world.translation, packs_[i]), packs_[i], equations);
   }
   *information = equations.Information();
@@ -227,7 +233,7 @@ std::optional<PoseProblem::Vector6d> PoseProblem::Step(const Rigid3& camera_from
   const Vector6d step = information->ldlt().solve(-gradient);
   if (!step.allFinite()) return std::nullopt;
   // The point's motion is M step = translation + rotation x point.
-  for (size_t i = 0; i < packs_.size(); ++i) {
+  for (size_t i = 0; i < num_voting_packs_; ++i) {
     const Eliminated& e = eliminated_[i];
     const Four motion[3] = {step[0] + step[4] * e.point[2] - step[5] * e.point[1],
                             step[1] + step[5] * e.point[0] - step[3] * e.point[2],
@@ -257,8 +263,10 @@ int PoseProblem::Classify(const Rigid3& camera_from_world) {
 }
 
 std::vector<char> PoseProblem::is_inlier() const {
-  std::vector<char> is_inlier(num_observations_);
-  for (size_t i = 0; i < num_observations_; ++i) is_inlier[i] = packs_[i / kLanes].is_inlier[i % kLanes] > 0.0 ? 1 : 0;
+  std::vector<char> is_inlier(lane_of_.size());
+  for (size_t i = 0; i < is_inlier.size(); ++i) {
+    is_inlier[i] = packs_[lane_of_[i] / kLanes].is_inlier[lane_of_[i] % kLanes] > 0.0 ? 1 : 0;
+  }
   return is_inlier;
 }
 

@@ -46,7 +46,7 @@ class PoseProblem {
     Four relative_sigma = {};             // of the inverse depth
     Four u = {};                          // standard deviations that the inverse depth is off
     Four is_inlier = {};                  // 1 or 0
-    Four votes = {};                      // 1 or 0: takes no part in steps
+    Four votes = {};                      // 1: takes part in steps; 0: is classified only
   };
   // The whitened residual, by the point in the camera's frame and by u:
   //
@@ -76,7 +76,8 @@ class PoseProblem {
   const PosePrior* prior_;
   const CameraCalibration& calibration_;
   double baseline_m_;
-  size_t num_observations_;
+  std::vector<size_t> lane_of_;  // by observation, counted over all packs: those that vote come first
+  size_t num_voting_packs_ = 0;  // steps need no others
   std::vector<Pack> packs_;
   std::vector<Eliminated> eliminated_;  // by pack
   // Of the last step, its observations alone: the inverse of their information about the translation; zero before it.

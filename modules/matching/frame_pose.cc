@@ -5,14 +5,9 @@
 namespace tessera {
 
 int OptimizeFrame(const PoseOptimizationOptions& options, TrackedFrame& frame) {
-  return OptimizeFramePose(options, nullptr, frame).num_inliers;
-}
-
-PoseOptimizationResult OptimizeFramePose(const PoseOptimizationOptions& options, const PosePrior* prior,
-                                         TrackedFrame& frame) {
-  PoseOptimizationResult pose = PoseByPoints(options, prior, frame);
+  const PoseOptimizationResult pose = PoseByPoints(options, nullptr, frame);
   TakePose(pose, frame);
-  return pose;
+  return pose.num_inliers;
 }
 
 PoseOptimizationResult PoseByPoints(const PoseOptimizationOptions& options, const PosePrior* prior,
@@ -24,7 +19,7 @@ PoseOptimizationResult PoseByPoints(const PoseOptimizationOptions& options, cons
     observations.push_back({.point_in_world = landmark.position_in_world,
                             .depth_sigma_in_world = landmark.depth_sigma * landmark.normal,
                             .seen = frame.view->observation(static_cast<int>(i)),
-                            .votes = votes.empty() || votes[i] != 0});
+                            .votes = votes.empty() || votes[observations.size()] != 0});
   }
   return OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
                       frame.world_from_camera.Inverse(), options, prior);

@@ -12,14 +12,11 @@ namespace tessera {
 // of points that are left.
 int OptimizeFrame(const PoseOptimizationOptions& options, TrackedFrame& frame);
 
-// The same with a prior (nullptr: none), and all that is known of the result.
-PoseOptimizationResult OptimizeFramePose(const PoseOptimizationOptions& options, const PosePrior* prior,
-                                         TrackedFrame& frame);
-
-// In two steps: what the pose would be, an observation for each point that the frame sees, in the order of keypoints;
-// `votes` (by keypoint; empty: all) tells whose points take part. And the frame with that pose, without its outliers.
+// The first of these two steps: the frame's pose by the points that it sees, which are the observations, in the order
+// of keypoints. `votes`: PoseObservation::votes of each (empty: all do); `prior`: nullptr: none.
 PoseOptimizationResult PoseByPoints(const PoseOptimizationOptions& options, const PosePrior* prior,
                                     const TrackedFrame& frame, std::span<const char> votes = {});
+// The second: the frame takes that pose and loses its outliers.
 void TakePose(const PoseOptimizationResult& pose, TrackedFrame& frame);
 
 }  // namespace tessera

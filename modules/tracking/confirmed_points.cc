@@ -1,6 +1,7 @@
 #include "tracking/confirmed_points.h"
 
 #include <cstdlib>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -28,52 +29,41 @@ bool IsConfirmed(const Map& map, LandmarkId id) {
   return std::abs(seen_us(observations.back()) - seen_us(observations.front())) >= kMinStanding_us;
 }
 
-// Of the confirmed points.
-struct Inliers {
-  int num_by_all = 0, num_by_confirmed = 0;
-  int num_by_either = 0;  // but not by both
+// How many of the confirmed points are inliers.
+int NumInliers(const std::vector<char>& is_confirmed, const PoseOptimizationResult& pose) {
+  return std::inner_product(is_confirmed.begin(), is_confirmed.end(), pose.is_inlier.begin(), 0);
+}
 
-  // A paired test: if both poses were as good, each of those would be as likely for the one as for the other.
-  bool Contradict() const {
-    const int difference = num_by_confirmed - num_by_all;
-    return num_by_all <= kMinShareByAll * num_by_confirmed &&
-           difference * difference >= kMinSigmas * kMinSigmas * num_by_either;
+// Whether the confirmed points' own pose fits them better, by a paired test: if it did not, those that are inliers of
+// one pose only would be as likely those of the one as of the other.
+bool FitsBetter(const std::vector<char>& is_confirmed, const PoseOptimizationResult& own,
+                const PoseOptimizationResult& by_all) {
+  int num_own = 0, num_by_all = 0;  // inliers of that pose only
+  for (size_t k = 0; k < is_confirmed.size(); ++k) {
+    if (is_confirmed[k] == 0) continue;
+    num_own += own.is_inlier[k] > by_all.is_inlier[k] ? 1 : 0;
+    num_by_all += by_all.is_inlier[k] > own.is_inlier[k] ? 1 : 0;
   }
-};
-
-Inliers Compare(const TrackedFrame& frame, const std::vector<char>& is_confirmed, const PoseOptimizationResult& by_all,
-                const PoseOptimizationResult& by_confirmed) {
-  Inliers inliers;
-  size_t k = 0;
-  for (size_t i = 0; i < is_confirmed.size(); ++i) {
-    if (!frame.points[i].valid()) continue;
-    const int all = by_all.is_inlier[k], confirmed = by_confirmed.is_inlier[k];
-    ++k;
-    if (is_confirmed[i] == 0) continue;
-    inliers.num_by_all += all;
-    inliers.num_by_confirmed += confirmed;
-    inliers.num_by_either += all ^ confirmed;
-  }
-  return inliers;
+  const int difference = num_own - num_by_all;
+  return difference * difference >= kMinSigmas * kMinSigmas * (num_own + num_by_all) &&
+         NumInliers(is_confirmed, by_all) <= kMinShareByAll * NumInliers(is_confirmed, own);
 }
 
 }  // namespace
 
 PoseOptimizationResult OptimizeByConfirmed(const MapReplica& replica, const PoseOptimizationOptions& options,
                                            const PosePrior* prior, TrackedFrame& frame) {
-  std::vector<char> is_confirmed(frame.points.size());
-  int num = 0;
-  for (size_t i = 0; i < is_confirmed.size(); ++i) {
-    const LandmarkId id = frame.points[i].id.landmark;
-    is_confirmed[i] = id.valid() && IsConfirmed(replica.map(), id) ? 1 : 0;
-    num += is_confirmed[i];
+  std::vector<char> is_confirmed;  // by point that the frame sees
+  for (const SeenPoint& point : frame.points) {
+    if (point.valid()) is_confirmed.push_back(IsConfirmed(replica.map(), point.id.landmark) ? 1 : 0);
   }
+  const int num = std::accumulate(is_confirmed.begin(), is_confirmed.end(), 0);
   PoseOptimizationResult pose = PoseByPoints(options, prior, frame);
-  if (num >= kMinConfirmed && Compare(frame, is_confirmed, pose, pose).num_by_all <= kMinShareByAll * num) {
-    PoseOptimizationResult by_confirmed = PoseByPoints(options, prior, frame, is_confirmed);
-    const Inliers inliers = Compare(frame, is_confirmed, pose, by_confirmed);
-    const bool agree = inliers.num_by_confirmed >= kMinConfirmed && inliers.num_by_confirmed > kMinAgreeing * num;
-    if (agree && inliers.Contradict()) pose = std::move(by_confirmed);
+  if (num >= kMinConfirmed && NumInliers(is_confirmed, pose) <= kMinShareByAll * num) {
+    PoseOptimizationResult own = PoseByPoints(options, prior, frame, is_confirmed);
+    const int num_agreeing = NumInliers(is_confirmed, own);
+    const bool agree = num_agreeing >= kMinConfirmed && num_agreeing > kMinAgreeing * num;
+    if (agree && FitsBetter(is_confirmed, own, pose)) pose = std::move(own);
   }
   TakePose(pose, frame);
   return pose;

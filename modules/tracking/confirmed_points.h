@@ -7,11 +7,11 @@
 
 namespace tessera {
 
-// As OptimizeFramePose, over all points that the frame sees, unless those that are confirmed contradict it: three
-// keyframes, half a second apart or more, saw each of them where it is, so it stood still that long. A person who walks
-// by, or a bus, can fill the image with points, and each keyframe brings more of them; but they have gone before they
-// are confirmed. Where a pose of the confirmed points alone has more of these as inliers, it holds, and what agrees
-// with it is kept.
+// The frame takes the pose by all points that it sees, and loses the outliers (PoseByPoints, TakePose), unless those
+// that are confirmed contradict it: three keyframes, half a second apart or more, saw each of these where it is, so it
+// stood still that long. A person who walks by, or a bus, can fill the image with points, and each keyframe brings more
+// of them; but they have gone before they are confirmed. Where the pose by the confirmed points alone fits these
+// better, the frame takes that one, and keeps all points that agree with it.
 PoseOptimizationResult OptimizeByConfirmed(const MapReplica& replica, const PoseOptimizationOptions& options,
                                            const PosePrior* prior, TrackedFrame& frame);
 

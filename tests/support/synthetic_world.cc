@@ -141,6 +141,17 @@ size_t PlantedMap::PointOf(const Observation& seen) const {
   return points_[static_cast<size_t>(seen.keyframe.value)][static_cast<size_t>(seen.keypoint)];
 }
 
+TrackedFrame PlantedMap::FrameOf(KeyframeId id) const {
+  const Keyframe& keyframe = *map_.FindKeyframe(id);
+  TrackedFrame frame(ViewOf(*keyframe.features));
+  frame.world_from_camera = keyframe.world_from_camera;
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    const LandmarkId landmark = keyframe.landmarks[i];
+    if (landmark.valid()) frame.points[i] = {{landmark, {}, -1}, *map_.FindLandmark(landmark)};
+  }
+  return frame;
+}
+
 int PlantedMap::NumMixed(const Map& map) const {
   int num_mixed = 0;
   map.landmarks().ForEach([&](LandmarkId id, const Landmark&) {

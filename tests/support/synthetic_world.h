@@ -75,6 +75,8 @@ class PlantedMap {
   // That made the map, one a keyframe.
   const std::vector<MapDelta>& deltas() const { return deltas_; }
   size_t PointOf(const Observation& seen) const;
+  // The frame of a keyframe, at its pose in the map, that sees all landmarks of it.
+  TrackedFrame FrameOf(KeyframeId id) const;
   const Rigid3& Truth(KeyframeId id) const { return poses_[static_cast<size_t>(id.value)]; }
   // matched_from_current as it is in truth.
   Rigid3 Between(KeyframeId matched, KeyframeId current) const { return Truth(matched).Inverse() * Truth(current); }

@@ -18,11 +18,8 @@ class LocalPointsTest : public testing::Test {
   LocalPointsTest() {
     for (int64_t k = 0; k < 10; ++k) planted_.Add(3 * k, {k - 1});
     for (const MapDelta& delta : planted_.deltas()) EXPECT_THAT(replica_.Apply(delta), IsSuccess());
-    const Keyframe& last = *map().FindKeyframe({9});
-    frame_.emplace(ViewOf(*last.features));
-    for (size_t i = 0; i < last.landmarks.size(); i += 2) {
-      frame_->points[i] = {{last.landmarks[i], {}, -1}, *map().FindLandmark(last.landmarks[i])};
-    }
+    frame_.emplace(planted_.FrameOf({9}));
+    for (size_t i = 1; i < frame_->points.size(); i += 2) frame_->points[i] = {};
   }
   const Map& map() const { return replica_.map(); }
   bool SeesLandmark(LandmarkId id) const {
