@@ -7,11 +7,14 @@
 #include <cstring>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 #include "core/errors.h"
 #include "core/files.h"
 #include "datasets/color_pixels.h"
+#include "datasets/png_file.h"
 #include "datasets/text_file.h"
 
 namespace tessera {
@@ -78,12 +81,17 @@ bool IsComplete(const std::string& bytes) {
   return true;  // other formats: OpenCV refuses a short file
 }
 
-cv::Mat Decode(const std::string& path, int flags) {
-  const std::string bytes = ReadFile(path);
+std::string ReadWhole(const std::string& path) {
+  std::string bytes = ReadFile(path);
   if (!IsComplete(bytes) || bytes.empty()) {
     throw InputError("image " + path + " is truncated after " + std::to_string(bytes.size()) +
                      " bytes: copy it again from its origin");
   }
+  return bytes;
+}
+
+// What OpenCV makes of the bytes of the file at `path`.
+cv::Mat Decode(const std::string& bytes, int flags, const std::string& path) {
   const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
                        const_cast<char*>(bytes.data()));  // imdecode only reads it
   cv::Mat image;
@@ -113,15 +121,23 @@ Image<Pixel> CopyPixels(const cv::Mat& mat) {
 
 }  // namespace
 
-GrayImage ReadGrayImage(const std::string& path) { return CopyPixels<uint8_t>(Decode(path, cv::IMREAD_GRAYSCALE)); }
+GrayImage ReadGrayImage(const std::string& path) {
+  const std::string bytes = ReadWhole(path);
+  if (std::optional<GrayImage> image = GrayOfPng(bytes)) return std::move(*image);
+  return CopyPixels<uint8_t>(Decode(bytes, cv::IMREAD_GRAYSCALE, path));
+}
 
 ColorImage ReadColorImage(const std::string& path) {
-  const cv::Mat image = Decode(path, cv::IMREAD_ANYCOLOR);
+  const std::string bytes = ReadWhole(path);
+  if (std::optional<ColorImage> image = ColorOfPng(bytes)) return std::move(*image);
+  const cv::Mat image = Decode(bytes, cv::IMREAD_ANYCOLOR, path);
   return image.type() == CV_8UC3 ? ColorsOf(image) : ColorImage();
 }
 
 DepthImage ReadDepthImage(const std::string& path) {
-  const cv::Mat depth = Decode(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+  const std::string bytes = ReadWhole(path);
+  if (std::optional<DepthImage> image = DepthOfPng(bytes)) return std::move(*image);
+  const cv::Mat depth = Decode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR, path);
   if (depth.type() != CV_16UC1) {
     throw InputError("depth image " + path +
                      " must have one channel of 16 bits: convert it, for example to a 16-bit PNG");
