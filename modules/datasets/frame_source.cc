@@ -3,6 +3,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/errors.h"
+#include "datasets/doubled_source.h"
 #include "datasets/recording.h"
 #include "datasets/simulated_source.h"
 #include "datasets/stream_source.h"
@@ -12,19 +13,7 @@ namespace {
 
 constexpr const char* kKinds = "kitti:DIR, euroc:DIR, tum:DIR, video:FILE, camera:N, rtsp://..., sim:NAME or log:FILE";
 
-}  // namespace
-
-SensorType ParseSensor(const std::string& text) {
-  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo, SensorType::kRgbd}) {
-    if (text == ToString(sensor)) {
-      return sensor;
-    }
-  }
-  throw InputError("sensor `" + text + "` is unknown: give mono, stereo or rgbd");
-}
-
-std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
-  cv::setNumThreads(1);  // parallelism is between processes; the cores belong to the extractors
+std::unique_ptr<FrameSource> Open(const SourceOptions& options) {
   const std::string& source = options.source;
   const std::string kind = source.substr(0, source.find(':'));
   const std::string rest = source.size() > kind.size() ? source.substr(kind.size() + 1) : "";
@@ -39,6 +28,22 @@ std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   if (kind == "camera") return OpenDevice(rest, options);
   if (kind == "rtsp" || kind == "rtsps") return OpenNetworkStream(source, options);
   throw InputError("source `" + source + "` is of an unknown kind: give " + kKinds);
+}
+
+}  // namespace
+
+SensorType ParseSensor(const std::string& text) {
+  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo, SensorType::kRgbd}) {
+    if (text == ToString(sensor)) {
+      return sensor;
+    }
+  }
+  throw InputError("sensor `" + text + "` is unknown: give mono, stereo or rgbd");
+}
+
+std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
+  cv::setNumThreads(1);  // parallelism is between processes; the cores belong to the extractors
+  return DoubleIfSmall(Open(options), options.min_focal_px);
 }
 
 }  // namespace tessera

@@ -24,6 +24,7 @@ struct SourceOptions {
   int64_t first_frame = 0;                // frames first_frame .. last_frame - 1 are wanted
   int64_t last_frame = -1;                // -1: to the end
   bool with_color = false;                // TakeColor() is called
+  double min_focal_px = 0.0;              // images of a shorter focal length are doubled (doubled_source.h)
 };
 
 // Reads the color image of a frame when it is called, rectified as that frame is; empty if the image is gray. To be

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kSignature = 8;  // bytes before the first chunk
+constexpr size_t kSignature = 8;   // bytes before the first chunk
 constexpr size_t kHeaderEnd = 33;  // of the first chunk, IHDR
 // Chunks that change how libpng turns color into gray, or that add transparency.
 constexpr std::array<std::string_view, 5> kOfAnotherKind = {"tRNS", "gAMA", "sRGB", "iCCP", "cHRM"};
@@ -43,8 +43,8 @@ unsigned Inflate(unsigned char** out, size_t* out_size, const unsigned char* in,
   *out = static_cast<unsigned char*>(std::malloc(size));  // NOLINT(*-no-malloc,*-owning-memory): LodePNG frees it
   *out_size = size;
   // It checks the sum over all pixels, too.
-  return *out != nullptr && libdeflate_zlib_decompress(decompressor.get(), in, in_size, *out, size, nullptr) ==
-                                LIBDEFLATE_SUCCESS
+  return *out != nullptr &&
+                 libdeflate_zlib_decompress(decompressor.get(), in, in_size, *out, size, nullptr) == LIBDEFLATE_SUCCESS
              ? 0
              : 1;
 }

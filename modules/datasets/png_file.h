@@ -9,8 +9,8 @@
 
 namespace tessera {
 
-// Each takes the bytes of a whole file, and gives what OpenCV reads of it, bit for bit. None: the file is of another kind
-// (interlaced, with a palette, with transparency, with a gamma to be respected, of another depth) or damaged.
+// Each takes the bytes of a whole file, and gives what OpenCV reads of it, bit for bit. None: the file is of another
+// kind (interlaced, with a palette, with transparency, with a gamma to be respected, of another depth) or damaged.
 
 // Of 8 bits, gray or color.
 std::optional<GrayImage> GrayOfPng(const std::string& bytes);

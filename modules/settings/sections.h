@@ -97,6 +97,7 @@ struct CameraSettings {
   int last_frame = 0;
   int lockstep_window = 0;
   double depth_unit_m = 0.0;
+  double min_focal_px = 0.0;
   double give_up_s = 0.0;
   bool color = false;
 
@@ -110,6 +111,7 @@ struct CameraSettings {
     field("last_frame", self.last_frame, Range{-1, kAnyCount});
     field("lockstep_window", self.lockstep_window, Range{1, 1000, "frames"});
     field("depth_unit_m", self.depth_unit_m, Range{0, 1, "m"});
+    field("min_focal_px", self.min_focal_px, Range{0, 10'000, "px"});
     field("give_up_s", self.give_up_s, Range{0, 1e6, "s"});
     field("color", self.color);
   }

@@ -59,6 +59,8 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.source.first_frame = value;
     else if (key == "last")
       arguments.source.last_frame = value;
+    else if (key == "min_focal")
+      arguments.source.min_focal_px = static_cast<double>(value);
     else if (key == "features")
       arguments.features.num_features = static_cast<int>(value);
     else if (key == "mirror")

@@ -25,6 +25,7 @@ std::unique_ptr<FrameSource> Open(const Settings& settings, int64_t first_frame)
   options.first_frame = first_frame;
   options.last_frame = camera.last_frame;
   options.with_color = camera.color;
+  options.min_focal_px = camera.min_focal_px;
   if (IsLive(options.source)) {
     SourceOptions all = options;
     all.first_frame = 0;
