@@ -71,7 +71,7 @@ TEST(PngFile, ColorsAreThoseOfTheFileAndNoneIfAllAreGray) {
   const cv::Mat image = NoisySlope(37, 21, CV_8UC3);
   const std::optional<ColorImage> colors = ColorOfPng(Encode(image));
   ASSERT_TRUE(colors);
-  const cv::Vec3b pixel = image.at<cv::Vec3b>(5, 9);  // blue first
+  const auto& pixel = image.at<cv::Vec3b>(5, 9);  // blue first
   EXPECT_EQ(colors->row(5)[9], (Rgb{.red = pixel[2], .green = pixel[1], .blue = pixel[0]}));
   const std::optional<ColorImage> none = ColorOfPng(Encode(cv::Mat(21, 37, CV_8UC3, cv::Scalar(70, 70, 70))));
   ASSERT_TRUE(none);
