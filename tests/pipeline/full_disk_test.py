@@ -12,12 +12,12 @@ from helpers.stack import Finished, Tessera
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Of 3 MB, less than the recording of the sequence takes."""
+    """Of 12 MB, less than the recording of the sequence takes."""
     if os.geteuid() != 0:
         pytest.skip("only root can mount a file system of a few megabytes")
     folder = tmp_path / "disk"
     folder.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=3m", "none", folder], capture_output=True, text=True)
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=12m", "none", folder], capture_output=True, text=True)
     if mounted.returncode != 0:
         pytest.skip(f"this machine mounts no tmpfs: {mounted.stderr.strip()}")
     yield folder

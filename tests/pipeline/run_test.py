@@ -178,9 +178,12 @@ def test_a_stage_that_is_killed_changes_nothing(
 
 
 class KilledRun:
-    """A run whose stages are killed when it has so many poses. Nobody keeps more than its last messages in memory."""
+    """A run whose stages are killed when it has so many poses. Nobody keeps more than its last messages in memory.
 
-    def __init__(self, tessera: Tessera, sequence: Path, *options: object, history_bytes: int = 2_000_000) -> None:
+    8 MB are 13 images of the sequence, which are doubled (camera.min_focal_px): more than are on their way.
+    """
+
+    def __init__(self, tessera: Tessera, sequence: Path, *options: object, history_bytes: int = 8_000_000) -> None:
         port, self.folder = tessera.next_port(), tessera.next_folder()
         small = ("--set", f"stream.history_bytes={history_bytes}", "--extractors", 1)
         self._run = tessera.start("run", f"kitti:{sequence}", *small, *options, "--port", port, "--out", self.folder)
