@@ -1,4 +1,4 @@
-// Colors out of OpenCV's images.
+// Colors out of decoded images.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -7,8 +7,10 @@
 
 namespace tessera {
 
-// Of an image of type CV_8UC3, blue first; empty if all its pixels are gray: that is how decoders of video give images
-// without color.
+// The image itself; empty if all its pixels are gray: that is how decoders of video give images without color.
+ColorImage NoneIfGray(ColorImage image);
+
+// Of an image of type CV_8UC3, blue first; empty if all its pixels are gray.
 ColorImage ColorsOf(const cv::Mat& image);
 
 }  // namespace tessera

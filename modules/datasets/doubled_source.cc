@@ -1,55 +1,28 @@
 #include "datasets/doubled_source.h"
 
-#include <algorithm>
+#include <opencv2/core/mat.hpp>
 #include <string>
 #include <utility>
+
+#include "datasets/remap_table.h"
 
 namespace tessera {
 namespace {
 
-// The pixels on both sides of a sample along one axis; `near` counts three times as much.
-struct Neighbors {
-  int near = 0;
-  int far = 0;
-};
-
-Neighbors NeighborsOf(int doubled, int size) {
-  const int near = doubled / 2, far = doubled % 2 == 0 ? near - 1 : near + 1;
-  return {near, std::clamp(far, 0, size - 1)};
-}
-
-uint8_t Blend(uint8_t near_near, uint8_t near_far, uint8_t far_near, uint8_t far_far) {
-  return static_cast<uint8_t>((9 * near_near + 3 * near_far + 3 * far_near + far_far + 8) / 16);
-}
-
-Rgb Blend(const Rgb& near_near, const Rgb& near_far, const Rgb& far_near, const Rgb& far_far) {
-  return {.red = Blend(near_near.red, near_far.red, far_near.red, far_far.red),
-          .green = Blend(near_near.green, near_far.green, far_near.green, far_far.green),
-          .blue = Blend(near_near.blue, near_far.blue, far_near.blue, far_far.blue)};
-}
-
-template <class Pixel>
-Image<Pixel> Blended(const Image<Pixel>& image) {
-  if (image.empty()) return {};
-  Image<Pixel> doubled(2 * image.width, 2 * image.height);
-  for (int y = 0; y < doubled.height; ++y) {
-    const Neighbors rows = NeighborsOf(y, image.height);
-    const Pixel *near = image.row(rows.near), *far = image.row(rows.far);
-    Pixel* out = doubled.row(y);
-    for (int x = 0; x < doubled.width; ++x) {
-      const Neighbors columns = NeighborsOf(x, image.width);
-      out[x] = Blend(near[columns.near], near[columns.far], far[columns.near], far[columns.far]);
+// Pixel x of the doubled image stands at (x + 1/2) / 2 - 1/2 of the original one: a quarter before or behind a pixel.
+RemapTable TableOf(const CameraCalibration& original) {
+  constexpr int kSteps = RemapTable::kSteps;
+  const cv::Size size(2 * original.width_px, 2 * original.height_px);
+  cv::Mat whole(size, CV_16SC2), fraction(size, CV_16UC1);
+  const auto whole_of = [](int x) { return (x + 1) / 2 - 1; };
+  const auto steps_of = [](int x) { return x % 2 == 0 ? 3 * kSteps / 4 : kSteps / 4; };
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      whole.at<cv::Vec2s>(y, x) = {static_cast<int16_t>(whole_of(x)), static_cast<int16_t>(whole_of(y))};
+      fraction.at<uint16_t>(y, x) = static_cast<uint16_t>(kSteps * steps_of(y) + steps_of(x));
     }
   }
-  return doubled;
-}
-
-DepthImage Repeated(const DepthImage& image) {
-  DepthImage doubled(2 * image.width, 2 * image.height);
-  for (int y = 0; y < doubled.height; ++y) {
-    for (int x = 0; x < doubled.width; ++x) doubled.row(y)[x] = image.row(y / 2)[x / 2];
-  }
-  return doubled;
+  return {whole, fraction, original.width_px, original.height_px};
 }
 
 CameraCalibration Doubled(CameraCalibration camera) {
@@ -65,8 +38,12 @@ CameraCalibration Doubled(CameraCalibration camera) {
 class DoubledSource : public FrameSource {
  public:
   explicit DoubledSource(std::unique_ptr<FrameSource> source)
-      : source_(std::move(source)), calibration_(Doubled(source_->calibration())) {
-    Renew();
+      : source_(std::move(source)),
+        calibration_(Doubled(source_->calibration())),
+        table_(std::make_shared<const RemapTable>(TableOf(source_->calibration()))),
+        notes_{"the images are small (" + std::to_string(source_->calibration().width_px) + "x" +
+               std::to_string(source_->calibration().height_px) + " px): they are doubled (camera.min_focal_px)"} {
+    TakeNotes();
   }
 
   const CameraCalibration& calibration() const override { return calibration_; }
@@ -74,17 +51,20 @@ class DoubledSource : public FrameSource {
   const std::vector<GroundTruthPose>& ground_truth() const override { return source_->ground_truth(); }
   std::optional<CameraFrame> Next() override {
     std::optional<CameraFrame> frame = source_->Next();
-    Renew();
+    TakeNotes();
     if (!frame) return frame;
-    frame->left = Blended(frame->left);
-    frame->right = Blended(frame->right);
-    frame->depth = Repeated(frame->depth);
+    frame->left = table_->Interpolate(frame->left);
+    if (!frame->right.empty()) frame->right = table_->Interpolate(frame->right);
+    if (!frame->depth.empty()) frame->depth = table_->Nearest(frame->depth);
     return frame;
   }
   ColorReader TakeColor() override {
     ColorReader read = source_->TakeColor();
     if (!read) return read;
-    return [read = std::move(read)] { return Blended(read()); };
+    return [table = table_, read = std::move(read)] {
+      ColorImage image = read();
+      return image.empty() ? image : table->Interpolate(image);
+    };
   }
   bool HasNext() override { return source_->HasNext(); }
   void SkipTo(FrameId frame) override { source_->SkipTo(frame); }
@@ -94,16 +74,15 @@ class DoubledSource : public FrameSource {
   std::string loss() const override { return source_->loss(); }
 
  private:
-  // The source's notes may have become more.
-  void Renew() {
-    if (!notes_.empty() && notes_.size() == source_->notes().size() + 1) return;
-    notes_ = {"the images are small (" + std::to_string(source_->calibration().width_px) + "x" +
-              std::to_string(source_->calibration().height_px) + " px): they are doubled (camera.min_focal_px)"};
-    notes_.insert(notes_.end(), source_->notes().begin(), source_->notes().end());
+  // Those that came since; the first is its own.
+  void TakeNotes() {
+    const std::vector<std::string>& all = source_->notes();
+    notes_.insert(notes_.end(), all.begin() + static_cast<ptrdiff_t>(notes_.size() - 1), all.end());
   }
 
   const std::unique_ptr<FrameSource> source_;
   const CameraCalibration calibration_;
+  const std::shared_ptr<const RemapTable> table_;  // color readers, which may outlive a live source, have it too
   std::vector<std::string> notes_;
 };
 

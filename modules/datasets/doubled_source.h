@@ -1,11 +1,9 @@
 // Small images, doubled before anything else sees them.
 //
-// A corner is found to a third of a pixel, whatever its pixel is worth; and all that decides by pixels, how far around
-// its prediction a point is looked for, how wide a residual may be, lets in twice the angle where the focal length is
-// half as long. What is let in are corners that crept along with the image; the scale of mono followed them by 5 % in
-// 100 m. Such images, of cheap cameras, hold more than that: doubled, they are as good as larger ones
-// (README of the tracker, "Small images"; SIFT doubles its images, too: D. Lowe, "Distinctive Image Features from
-// Scale-Invariant Keypoints", IJCV 2004).
+// Search radii and residuals have limits in pixels. Where the focal length is half as long, these let in twice the
+// angle, and with it corners that creep along with the image: the scale of mono fell by 5 % in 100 m. Yet the images of
+// such cameras show more than that: doubled, they do as well as larger ones (README of the tracker, "Small images").
+// SIFT doubles its images, too (D. Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004).
 #pragma once
 
 #include <memory>
@@ -15,8 +13,8 @@
 namespace tessera {
 
 // The source itself, unless its focal length is below `min_focal_px`: then its frames and their calibration, doubled.
-// A pixel x is sampled at (x + 1/2) / 2 - 1/2: intensities and colors between pixels by exact sixteenths, depth counts
-// at the nearest pixel.
+// Intensities and colors are interpolated, depth counts are not (remap_table.h). Throws InputError if the images are
+// less than two pixels wide or high.
 std::unique_ptr<FrameSource> DoubleIfSmall(std::unique_ptr<FrameSource> source, double min_focal_px);
 
 }  // namespace tessera

@@ -9,6 +9,8 @@
 #include <memory>
 #include <string_view>
 
+#include "datasets/color_pixels.h"
+
 namespace tessera {
 namespace {
 
@@ -86,7 +88,7 @@ uint8_t Gray(const Rgb& color) {
   return static_cast<uint8_t>((9797U * color.red + 19234U * color.green + 3737U * color.blue) >> 15);
 }
 
-// All of `image`'s pixels, each made of `bytes_per_pixel` bytes by `make`.
+// All of its pixels, each made of `bytes_per_pixel` bytes by `make`.
 template <class Pixel, class Make>
 Image<Pixel> ImageOf(const Pixels& pixels, size_t bytes_per_pixel, Make make) {
   Image<Pixel> image(pixels.width, pixels.height);
@@ -115,10 +117,7 @@ std::optional<GrayImage> GrayOfPng(const std::string& bytes) {
 std::optional<ColorImage> ColorOfPng(const std::string& bytes) {
   const auto color = Decode(bytes, LCT_RGB, 8);
   if (!color) return {};
-  ColorImage image = ImageOf<Rgb>(*color, 3, ColorAt);
-  const auto is_gray = [](const Rgb& pixel) { return pixel.red == pixel.green && pixel.green == pixel.blue; };
-  if (std::all_of(image.pixels.begin(), image.pixels.end(), is_gray)) return ColorImage();
-  return image;
+  return NoneIfGray(ImageOf<Rgb>(*color, 3, ColorAt));
 }
 
 std::optional<DepthImage> DepthOfPng(const std::string& bytes) {

@@ -2,7 +2,8 @@
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0]
-//   [vocabulary=FILE] offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
+//   [min_focal=0] [vocabulary=FILE]
+//   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
 // With several delays, the sequence is played once with each; the spread tells what chance alone does to the errors.
 // OUT_DIR, or its delay_N for each of several delays, gets figures.csv, frames.csv, trajectory.txt (after all

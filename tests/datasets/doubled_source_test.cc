@@ -76,6 +76,13 @@ TEST(DoubledSource, BlendsBetweenPixelsAndRepeatsDepths) {
   EXPECT_FALSE(source->Next());
 }
 
+TEST(DoubledSource, ColorsCanBeReadWhenALiveSourceHasGone) {
+  auto source = DoubleIfSmall(std::make_unique<SmallSource>(), 301.0);
+  const ColorReader read = source->TakeColor();
+  source.reset();
+  EXPECT_EQ(read(), ColorImage(6, 4, {.red = 10, .green = 20, .blue = 30}));
+}
+
 TEST(DoubledSource, ItsCameraSeesTheSamePointsAtTheSamePixels) {
   const SmallSource small;
   const auto source = DoubleIfSmall(std::make_unique<SmallSource>(), 301.0);
