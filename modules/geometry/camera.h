@@ -9,6 +9,8 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "core/result.h"
 
@@ -44,5 +46,20 @@ struct CameraCalibration {
     return {(pixel.x() - cx_px) / fx_px, (pixel.y() - cy_px) / fy_px, 1.0};
   }
 };
+
+// The focal lengths that a camera turns out to have, where they are others than its calibration says.
+struct FocalLengths {
+  double fx_px = 0.0;  // 0: as calibrated
+  double fy_px = 0.0;
+
+  bool is_known() const { return fx_px > 0.0; }
+  bool operator==(const FocalLengths&) const = default;
+};
+
+// The calibration with these focal lengths; itself where none are known.
+inline CameraCalibration WithFocal(CameraCalibration calibration, const FocalLengths& focal) {
+  if (focal.is_known()) std::tie(calibration.fx_px, calibration.fy_px) = std::pair(focal.fx_px, focal.fy_px);
+  return calibration;
+}
 
 }  // namespace tessera

@@ -136,6 +136,7 @@ Result<> Map::Apply(const MapDelta& delta) {
 }
 
 Result<> Map::ApplyLists(const MapDelta& delta) {
+  if (delta.focal.is_known()) ChangeFocal(delta.focal);
   for (const auto& added : delta.new_keyframes) TESSERA_RETURN_IF_FAILED(AddKeyframe(added));
   for (const auto& moved : delta.moved_keyframes) TESSERA_RETURN_IF_FAILED(MoveKeyframe(moved));
   for (const auto& changed : delta.changed_landmarks) TESSERA_RETURN_IF_FAILED(ChangeLandmark(changed));
@@ -149,6 +150,19 @@ Result<> Map::ApplyLists(const MapDelta& delta) {
   for (const KeyframeId id : delta.removed_keyframes) TESSERA_RETURN_IF_FAILED(RemoveKeyframe(id));
   for (const ClosedLoop& loop : delta.closed_loops) AddClosedLoop(loop);
   return {};
+}
+
+void Map::ChangeFocal(const FocalLengths& focal) {
+  focal_ = focal;
+  keyframes_.ForEach([&](KeyframeId id, const Keyframe& held) {
+    Keyframe& keyframe = *keyframes_.Find(id);
+    hash_ -= HashOf(id, held);
+    auto features = std::make_shared<FeatureFrame>(*held.features);
+    features->calibration = WithFocal(features->calibration, focal);
+    keyframe.features_hash = HashOf(*features);
+    keyframe.features = std::move(features);
+    hash_ += HashOf(id, held);
+  });
 }
 
 Result<> Map::AddKeyframe(const MapDelta::NewKeyframe& added) {
@@ -334,6 +348,7 @@ MapDelta Map::Snapshot() const {
   delta.answers = answered_;
   delta.is_snapshot = true;
   delta.hash = hash_;
+  delta.focal = focal_;
   size_t num_observations = 0;
   landmarks_.ForEach(
       [&](LandmarkId, const ObservedLandmark& landmark) { num_observations += landmark.observations.span().size(); });

@@ -58,7 +58,8 @@ struct CovisibleKeyframe {
   bool operator==(const CovisibleKeyframe&) const = default;
 };
 
-// A keyframe in the map: its features never change, its pose does.
+// A keyframe in the map: its features never change, but for the focal lengths in their calibration (Map::focal); its
+// pose does.
 //
 // Closing a loop of mono changes the scale of the map, by another factor at each keyframe. What was measured relative
 // to a keyframe (poses of frames) stays true in the units of that time: those of its map part when it began.
@@ -116,6 +117,7 @@ struct MapDelta {
   int64_t number = 0;        // counts from 0; a replica applies them in order
   KeyframeId answers;        // the keyframe whose processing made this delta: its logical time
   bool is_snapshot = false;  // starts from the empty map, whatever the replica held
+  FocalLengths focal;        // that all keyframes have from now on; new_keyframes bring them. Not known: as before
   std::vector<NewKeyframe> new_keyframes;
   std::vector<MovedKeyframe> moved_keyframes;
   std::vector<ChangedLandmark> changed_landmarks;  // new ones too
@@ -154,6 +156,8 @@ class Map {
   }
   const IdMap<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   const IdMap<LandmarkId, ObservedLandmark>& landmarks() const { return landmarks_; }
+  // Those of all keyframes, where the mapper found others than the calibration says; else not known.
+  const FocalLengths& focal() const { return focal_; }
   // In the order in which they were closed. Their keyframes stay in the map.
   const std::vector<ClosedLoop>& closed_loops() const { return closed_loops_; }
 
@@ -171,6 +175,7 @@ class Map {
   friend class MapEditor;  // the owner applies its edits one by one, and counts them as one delta
 
   Result<> ApplyLists(const MapDelta& delta);
+  void ChangeFocal(const FocalLengths& focal);
   Result<> AddKeyframe(const MapDelta::NewKeyframe& added);
   Result<> MoveKeyframe(const MapDelta::MovedKeyframe& moved);
   Result<> ChangeLandmark(const MapDelta::ChangedLandmark& changed);
@@ -187,6 +192,7 @@ class Map {
   IdMap<KeyframeId, Keyframe> keyframes_;
   IdMap<LandmarkId, ObservedLandmark> landmarks_;
   std::vector<ClosedLoop> closed_loops_;
+  FocalLengths focal_;
   int64_t next_delta_ = 0;
   KeyframeId answered_;
   uint64_t hash_ = 0;

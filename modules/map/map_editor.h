@@ -43,6 +43,9 @@ class MapEditor {
 
   void AddClosedLoop(const ClosedLoop& loop);
 
+  // Before any keyframe is added.
+  void ChangeFocal(const FocalLengths& focal);
+
   // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
   const IdSet<LandmarkId>& touched_landmarks() const { return touched_; }
   // Landmarks of which an observation came or went, also such as no longer exist.
@@ -65,6 +68,7 @@ class MapEditor {
   IdSet<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
   IdSet<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_, reobserved_;
   std::vector<ClosedLoop> closed_loops_;
+  FocalLengths focal_;
   std::vector<ObservationEdit> observations_;  // in the order of the edits
 };
 

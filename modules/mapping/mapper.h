@@ -9,6 +9,7 @@
 #include "map/map.h"
 #include "map/removed_keyframes.h"
 #include "mapping/correction_schedule.h"
+#include "mapping/focal_refiner.h"
 #include "mapping/keyframe_culling.h"
 #include "mapping/landmark_creation.h"
 #include "mapping/landmark_culling.h"
@@ -32,6 +33,8 @@ struct MapperOptions {
   LoopFusionOptions loop_fusion;
   // How many keyframes are mapped with caution after one whose way the images leave open (Mapper).
   int num_cautious_keyframes = 25;
+  // Mono: the focal lengths are those that explain the map best, where they clearly differ from the calibration's.
+  bool refines_focal = true;
   bool polishes = false;  // Finish() asks for a last global adjustment, of every part of the map, also without loops
 
   // Fails if a value is out of range.
@@ -63,6 +66,7 @@ class Mapper {
   const Map& map() const { return map_; }
   // Loops that were ignored since the map was corrected after they were found: the next keyframes find them again.
   int64_t num_void_loops() const { return num_void_loops_; }
+  const FocalRefiner& focal_refiner() const { return focal_refiner_; }
   // The poses of culled keyframes.
   const RemovedKeyframes& removed_keyframes() const { return removed_; }
 
@@ -87,6 +91,7 @@ class Mapper {
   RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;
   KeyframeCuller keyframe_culler_;
+  FocalRefiner focal_refiner_;
   KeyframeId last_corrected_;           // the delta that answers it corrected the map
   bool wants_adjustment_ = false;       // a loop was closed after the last adjustment was requested
   std::optional<AdjustmentBase> base_;  // of the adjustment under way

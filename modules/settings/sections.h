@@ -208,6 +208,7 @@ struct MapperSettings {
   int loop_delay_keyframes = 0;
   int adjustment_delay_keyframes = 0;
   bool polish = false;
+  bool refine_focal = false;
   std::string load_map;
 
   template <class Self, class Field>
@@ -219,6 +220,7 @@ struct MapperSettings {
     field("loop_delay_keyframes", self.loop_delay_keyframes, Range{1, MapArchive::kSnapshotInterval - 1, "keyframes"});
     field("adjustment_delay_keyframes", self.adjustment_delay_keyframes, Range{1, 100'000, "keyframes"});
     field("polish", self.polish);
+    field("refine_focal", self.refine_focal);
     field("load_map", self.load_map);
   }
 };

@@ -115,6 +115,7 @@ class MapTracker {
     StepEvidence evidence = StepEvidence::kStrong;
   };
 
+  std::shared_ptr<const FrameView> ViewOf(const FeatureFrame& features) const;
   MapTrackingResult UndecidedResult(const FrameView& view) const;
   void CountPoints(PoseEstimate& pose) const;
   void DescribePose(MapTrackingResult& result);

@@ -69,8 +69,9 @@ TrackerActions TrackerSession::Advance() {
 bool TrackerSession::FitsMap(const CameraCalibration& camera) {
   if (fits_map_ || tracker_.map().keyframes().size() == 0) return true;
   fits_map_ = true;
+  const CameraCalibration seen = WithFocal(camera, tracker_.map().focal());
   tracker_.map().keyframes().ForEach(
-      [&](KeyframeId, const Keyframe& keyframe) { fits_map_ &= keyframe.features->calibration == camera; });
+      [&](KeyframeId, const Keyframe& keyframe) { fits_map_ &= keyframe.features->calibration == seen; });
   return fits_map_;
 }
 

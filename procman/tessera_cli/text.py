@@ -31,3 +31,8 @@ def visible_values(value: Any) -> Any:
 
 def _visible_character(character: str) -> str:
     return character if character.isprintable() else character.encode("unicode_escape", "backslashreplace").decode()
+
+
+def focal_words(error: float) -> str:
+    """Of focal lengths, by which share they differ: "1.9 % shorter"."""
+    return f"{100 * abs(error):.1f} % {'longer' if error > 0 else 'shorter'}"

@@ -8,8 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "map/map_editor.h"
 #include "support/map_changes.h"
 #include "support/matchers.h"
+#include "support/synthetic_world.h"
 
 namespace tessera {
 namespace {
@@ -108,6 +110,28 @@ TEST(Map, TheHashCoversTheCamera) {
     features->calibration.fx_px += 1e-9;
     delta.new_keyframes[0].features = features;
   }));
+}
+
+TEST(Map, FocalLengthsChangeInAllKeyframesAndInWhatIsMadeOfThem) {
+  SyntheticWorld world(SensorType::kMono);
+  PlantedMap planted(world);
+  for (int64_t k = 0; k < 3; ++k) planted.Add(k, {k - 1});
+  Map replica;
+  for (const MapDelta& delta : planted.deltas()) ASSERT_TRUE(replica.Apply(delta));
+  const uint64_t before = replica.hash();
+  MapEditor editor(planted.map());
+  editor.ChangeFocal({490.0, 480.0});
+  ASSERT_TRUE(replica.Apply(editor.Finish({2})));
+  Map late;
+  ASSERT_TRUE(late.Apply(replica.Snapshot()));
+  EXPECT_NE(replica.hash(), before);
+  for (const Map* map : {&planted.map(), &replica, &late}) {
+    EXPECT_EQ(map->hash(), planted.map().hash());
+    EXPECT_EQ(map->focal(), (FocalLengths{490.0, 480.0}));
+    map->keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
+      EXPECT_EQ(keyframe.features->calibration, WithFocal(world.calibration(), {490.0, 480.0}));
+    });
+  }
 }
 
 TEST(Map, ScaleAndLoopsComeFromTheDeltas) {

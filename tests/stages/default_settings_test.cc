@@ -53,6 +53,7 @@ TEST(DefaultSettings, OfTheMapper) {
   EXPECT_EQ(settings.adjustment_delay_keyframes, options.delays.adjustment_keyframes);
   EXPECT_EQ(settings.close_loops, options.closes_loops);
   EXPECT_EQ(settings.polish, options.mapper.polishes);
+  EXPECT_EQ(settings.refine_focal, options.mapper.refines_focal);
 }
 
 TEST(DefaultSettings, OfTheLoopCloser) {

@@ -20,6 +20,7 @@ MapperSessionOptions OptionsFrom(const MapperSettings& settings) {
   options.mapper.window.max_inner_keyframes = settings.max_inner_keyframes;
   options.mapper.window.max_outer_keyframes = settings.max_outer_keyframes;
   options.mapper.polishes = settings.polish;
+  options.mapper.refines_focal = settings.refine_focal;
   options.delays.loop_keyframes = settings.loop_delay_keyframes;
   options.delays.adjustment_keyframes = settings.adjustment_delay_keyframes;
   options.closes_loops = settings.close_loops;
@@ -84,6 +85,8 @@ void MapperStage::Advance() {
   context_.SetValue("keyframes", static_cast<double>(map.keyframes().size()));
   context_.SetValue("landmarks", static_cast<double>(map.landmarks().size()));
   context_.SetValue("loops", static_cast<double>(map.closed_loops().size()));
+  context_.SetValue("focal_error", session_.focal_refiner().error());
+  context_.SetValue("focal_doubt", session_.focal_refiner().doubt());
 }
 
 void MapperStage::Do(const MapperActions& actions) {

@@ -6,6 +6,7 @@ import numpy as np
 
 from tessera_cli.runs.run_folder import Result, Summary
 from tessera_cli.runs.trajectories import length_m
+from tessera_cli.text import focal_words
 
 # A tracker that waits less than this per frame (95 %) is not slowed down by it.
 NOTABLE_WAIT_MS = 10.0
@@ -24,7 +25,15 @@ def num_loops(result: Result) -> int | None:
 
 def headline(result: Result) -> list[str]:
     """Sentences, the most important first."""
-    sentences = [_tracked(result), _error(result), _speed(result), _loops(result), _drift(result), _failures(result)]
+    sentences = [
+        _tracked(result),
+        _error(result),
+        _speed(result),
+        _loops(result),
+        _drift(result),
+        _focal(result),
+        _failures(result),
+    ]
     return [sentence for sentence in sentences if sentence]
 
 
@@ -83,6 +92,16 @@ def _drift(result: Result) -> str:
     loops = ", which loops have corrected in part" if num_loops(result) else ""
     return (
         f"The scale may have drifted by about {100 * drift:.0f} % since the map began (one standard deviation){loops}."
+    )
+
+
+def _focal(result: Result) -> str:
+    error = (result.summary.get("stage_values") or {}).get("mapper", {}).get("focal_error")
+    if not error:
+        return ""
+    return (
+        f"Focal lengths {focal_words(error)} than the calibration's explain the images better, and were used: "
+        "calibrate the camera anew."
     )
 
 

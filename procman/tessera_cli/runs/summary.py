@@ -16,7 +16,7 @@ from tessera_cli.files import write_text
 from tessera_cli.runs.run_folder import Frames, Result, Summary, default_alignment, read_run, read_source_events
 from tessera_cli.settings import without_password
 from tessera_cli.supervision.progress import FINISHED, StageReport
-from tessera_cli.text import visible_values
+from tessera_cli.text import focal_words, visible_values
 from tessera_cli.versions import collect_versions
 
 # Frames with doubtful steps that are no farther apart belong to one stretch.
@@ -117,7 +117,8 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         + drop_warnings(evaluated, result)
         + latency_warnings(result)
         + scale_warnings(result.frames, facts.sensor)
-        + agreement_warnings(result.frames, facts.sensor),
+        + agreement_warnings(result.frames, facts.sensor)
+        + focal_warnings(evaluated),
         "doubts": scale_doubts(result.frames),
         "not_written": not_written,
         "versions": collect_versions(),
@@ -265,6 +266,17 @@ def agreement_warnings(frames: Frames | None, sensor: str) -> list[str]:
         f"In half of the frames, at most {100 * share:.0f} % of the points that were found agree with the pose; as a "
         f"rule, it is 80 to 95 %. Poses may be wrong: the calibration does not fit (lens distortion), {cause}or much "
         "of what the camera sees moves."
+    ]
+
+
+def focal_warnings(evaluated: dict[str, Any]) -> list[str]:
+    """Where the images fit other focal lengths, so much that no calibration can be as wrong."""
+    doubt = evaluated.get("stage_values", {}).get("mapper", {}).get("focal_doubt")
+    if not doubt:
+        return []
+    return [
+        f"The images of this mono camera fit focal lengths {focal_words(doubt)} than the calibration's, which were not "
+        "used: check the calibration, its lens distortion too. In turns the scale may change."
     ]
 
 

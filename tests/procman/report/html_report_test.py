@@ -150,6 +150,13 @@ def test_the_drift_of_the_scale_is_told_of_mono_alone(tmp_path: Path) -> None:
         assert not told or words in told[0]
 
 
+def test_other_focal_lengths_than_the_calibration_s_are_told(tmp_path: Path) -> None:
+    for error, words in [(-0.0187, "Focal lengths 1.9 % shorter than"), (0.01, "1.0 % longer"), (0.0, "")]:
+        folder = write_run(tmp_path / f"{error}", sensor="mono", stage_values={"mapper": {"focal_error": error}})
+        told = [sentence for sentence in headline(read_run(folder)) if "ocal lengths" in sentence]
+        assert len(told) == bool(words) and (not told or words in told[0])
+
+
 def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:
     folder = write_run(
         tmp_path / "drive", loops=False, frames_tracked=0, pose_time_ms=None, latency_ms=None, map_wait_ms=None

@@ -12,6 +12,7 @@ from tessera_cli.runs.run_folder import Frames, Result, read_log_warnings, read_
 from tessera_cli.runs.summary import (
     agreement_warnings,
     drop_warnings,
+    focal_warnings,
     is_trustworthy,
     judge_end,
     latency_warnings,
@@ -114,6 +115,12 @@ def test_a_run_whose_points_do_not_agree_with_its_poses_says_what_may_be_wrong()
     assert agreement_warnings(replace(frames, inliers=some * matches), "mono") == [], "a hard stretch is none"
     few = replace(poor, matches=np.where(np.arange(100) < 20, matches, 0.0))
     assert agreement_warnings(few, "mono") == []
+
+
+def test_focal_lengths_that_no_calibration_explains_are_a_warning() -> None:
+    assert focal_warnings({}) == focal_warnings({"stage_values": {"mapper": {"focal_doubt": 0.0}}}) == []
+    (sentence,) = focal_warnings({"stage_values": {"mapper": {"focal_doubt": -0.046}}})
+    assert "4.6 % shorter" in sentence and "not used" in sentence
 
 
 def _live_result(latency_ms: np.ndarray, source: str = "kitti:/x", newest_wins: bool = True) -> Result:

@@ -1,0 +1,104 @@
+#include "mapping/focal_refiner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <map>
+#include <vector>
+
+#include "map/spanning_tree.h"
+#include "measurement/keypoint_measurement.h"
+#include "optimization/local_adjustment.h"
+
+namespace tessera {
+namespace {
+
+constexpr size_t kMaxKeyframes = 50;  // that a look takes in
+constexpr size_t kMinKeyframes = 20;
+constexpr size_t kMinObservers = 3;      // of those, of a landmark
+constexpr int64_t kMinInterval = 10;     // keyframes between looks; twice as many after each that finds no error
+constexpr int64_t kMaxInterval = 80;
+constexpr double kMinTurn_rad = 0.6;     // in all, of the keyframes
+constexpr double kMinError = 0.005;      // of a focal length, to be worth a change
+constexpr double kMinSigmas = 5.0;       // and beyond doubt
+constexpr double kMaxSigmasApart = 3.0;  // two looks
+constexpr double kMaxError = 0.03;       // against the calibration: beyond it, something else is wrong with the images
+
+// The newest keyframes of the newest part of the map.
+std::vector<KeyframeId> NewestKeyframes(const Map& map) {
+  std::vector<KeyframeId> part = MapPartOf(map, map.answered());
+  if (part.size() > kMaxKeyframes) part.erase(part.begin(), part.end() - static_cast<std::ptrdiff_t>(kMaxKeyframes));
+  return part;
+}
+
+double TurnOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
+  double turn = 0.0;
+  for (size_t i = 1; i < keyframes.size(); ++i) {
+    turn += map.FindKeyframe(keyframes[i - 1])
+                ->world_from_camera.rotation.angularDistance(map.FindKeyframe(keyframes[i])->world_from_camera.rotation);
+  }
+  return turn;
+}
+
+// The first pose is held, and how far from it the one is that stands at a quarter of the way: what is older than the
+// window hangs on its beginning.
+BundleProblem ProblemOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
+  BundleProblem problem;
+  problem.calibration = map.FindKeyframe(keyframes.front())->features->calibration;
+  problem.scale_pose = static_cast<int>(keyframes.size() / 4);
+  std::map<LandmarkId, std::vector<BundleObservation>> seen;
+  for (const KeyframeId id : keyframes) {
+    const Keyframe& keyframe = *map.FindKeyframe(id);
+    const int pose = static_cast<int>(problem.poses.size());
+    problem.poses.push_back({id, keyframe.world_from_camera.Inverse(), pose == 0});
+    for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+      if (!keyframe.landmarks[i].valid()) continue;
+      seen[keyframe.landmarks[i]].push_back({pose, -1, SeenAt(*keyframe.features, static_cast<int32_t>(i))});
+    }
+  }
+  for (auto& [id, observations] : seen) {
+    if (observations.size() < kMinObservers) continue;
+    for (BundleObservation& observation : observations) {
+      observation.point = static_cast<int>(problem.points.size());
+      problem.observations.push_back(observation);
+    }
+    problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
+  }
+  return problem;
+}
+
+bool IsError(const FocalEstimate& estimate) {
+  return std::abs(estimate.error) >= std::max(kMinError, kMinSigmas * estimate.sigma);
+}
+
+}  // namespace
+
+void FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor) {
+  const Map& map = editor.map();
+  if (given.sensor != SensorType::kMono || next < next_look_ || map.FindKeyframe(map.answered()) == nullptr) return;
+  const std::vector<KeyframeId> keyframes = NewestKeyframes(map);
+  next_look_ = {next.value + kMinInterval};
+  if (keyframes.size() < kMinKeyframes || TurnOf(map, keyframes) < kMinTurn_rad) return;
+  const BundleProblem problem = ProblemOf(map, keyframes);
+  const std::optional<FocalEstimate> found = EstimateFocal(problem);
+  const bool is_error = found && IsError(*found);
+  interval_ = is_error ? kMinInterval : std::clamp(2 * interval_, kMinInterval, kMaxInterval);
+  next_look_ = {next.value + interval_};
+  const std::optional<FocalEstimate> before = std::exchange(before_, is_error ? found : std::nullopt);
+  if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return;
+  const FocalLengths focal = ScaledFocal(problem.calibration, found->error);
+  const double total = focal.fx_px / given.fx_px - 1.0;
+  (std::abs(total) <= kMaxError ? error_ : doubt_) = total;
+  if (std::abs(total) <= kMaxError) Change(focal, problem, editor);
+}
+
+void FocalRefiner::Change(const FocalLengths& focal, BundleProblem problem, MapEditor& editor) {
+  problem.calibration = WithFocal(problem.calibration, focal);
+  const std::optional<BundleResult> adjusted = AdjustBundle(problem, GlobalBundleOptions());
+  if (!adjusted) return;
+  before_.reset();
+  editor.ChangeFocal(focal);
+  WriteBack(problem, *adjusted, editor);
+}
+
+}  // namespace tessera

@@ -1,0 +1,37 @@
+// Corrects the focal lengths of a mono camera by the map. An error of a percent is usual even where a camera was
+// calibrated with care, and costs little while the camera goes straight; but each turn then changes the scale of the
+// map, by 10 % in one of 90 degrees with an error of 2 % (KITTI 03).
+#pragma once
+
+#include <optional>
+
+#include "map/map_editor.h"
+#include "optimization/bundle_adjustment.h"
+#include "optimization/focal_estimation.h"
+
+namespace tessera {
+
+// Looks at the newest keyframes from time to time, where the camera has turned. Two looks in a row that agree are
+// needed to change anything.
+class FocalRefiner {
+ public:
+  // To be called before keyframe `next` is added; `given`: the calibration that keyframes come with. Where focal
+  // lengths change, the newest keyframes and their landmarks are adjusted to them.
+  void Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor);
+
+  // By which share of the given focal lengths the map's differ from them, as found here; 0: they don't.
+  double error() const { return error_; }
+  // Likewise what was found but not used, since no calibration is as wrong as that; 0: nothing.
+  double doubt() const { return doubt_; }
+
+ private:
+  void Change(const FocalLengths& focal, BundleProblem problem, MapEditor& editor);
+
+  KeyframeId next_look_;
+  int64_t interval_ = 0;                 // keyframes between looks
+  std::optional<FocalEstimate> before_;  // what the last look found, if it was a clear error
+  double error_ = 0.0;
+  double doubt_ = 0.0;
+};
+
+}  // namespace tessera
