@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "map/spanning_tree.h"
@@ -15,8 +15,8 @@ namespace {
 
 constexpr size_t kMaxKeyframes = 50;  // that a look takes in
 constexpr size_t kMinKeyframes = 20;
-constexpr size_t kMinObservers = 3;      // of those, of a landmark
-constexpr int64_t kMinInterval = 10;     // keyframes between looks; twice as many after each that finds no error
+constexpr size_t kMinObservers = 3;   // of those, of a landmark
+constexpr int64_t kMinInterval = 10;  // keyframes between looks; twice as many after each that finds no error
 constexpr int64_t kMaxInterval = 80;
 constexpr double kMinTurn_rad = 0.6;     // in all, of the keyframes
 constexpr double kMinError = 0.005;      // of a focal length, to be worth a change
@@ -34,8 +34,9 @@ std::vector<KeyframeId> NewestKeyframes(const Map& map) {
 double TurnOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
   double turn = 0.0;
   for (size_t i = 1; i < keyframes.size(); ++i) {
-    turn += map.FindKeyframe(keyframes[i - 1])
-                ->world_from_camera.rotation.angularDistance(map.FindKeyframe(keyframes[i])->world_from_camera.rotation);
+    turn +=
+        map.FindKeyframe(keyframes[i - 1])
+            ->world_from_camera.rotation.angularDistance(map.FindKeyframe(keyframes[i])->world_from_camera.rotation);
   }
   return turn;
 }

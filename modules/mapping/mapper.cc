@@ -159,8 +159,7 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
   const std::optional<Sim3> world_from_reference = removed_.Find(map_, seen.reference);
   const Sim3 world_from_keyframe =
       world_from_reference ? *world_from_reference * seen.reference_from_camera : Sim3::From(seen.world_from_camera);
-  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe,
-                     std::move(features));
+  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe, std::move(features));
 }
 
 void Mapper::RememberMotion(const KeyframeObservation& seen) {
