@@ -157,12 +157,15 @@ void Map::ChangeFocal(const FocalLengths& focal) {
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& held) {
     Keyframe& keyframe = *keyframes_.Find(id);
     hash_ -= HashOf(id, held);
-    auto features = std::make_shared<FeatureFrame>(*held.features);
-    features->calibration = WithFocal(features->calibration, focal);
-    keyframe.features_hash = HashOf(*features);
-    keyframe.features = std::move(features);
+    keyframe.features = std::make_shared<const FeatureFrame>(Calibrated(*held.features));
+    keyframe.features_hash = HashOf(*keyframe.features);
     hash_ += HashOf(id, held);
   });
+}
+
+FeatureFrame Map::Calibrated(FeatureFrame features) const {
+  features.calibration = WithFocal(features.calibration, focal_);
+  return features;
 }
 
 Result<> Map::AddKeyframe(const MapDelta::NewKeyframe& added) {

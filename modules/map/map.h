@@ -158,6 +158,8 @@ class Map {
   const IdMap<LandmarkId, ObservedLandmark>& landmarks() const { return landmarks_; }
   // Those of all keyframes, where the mapper found others than the calibration says; else not known.
   const FocalLengths& focal() const { return focal_; }
+  // What the source's camera saw, as the map's camera sees it: with these focal lengths.
+  FeatureFrame Calibrated(FeatureFrame features) const;
   // In the order in which they were closed. Their keyframes stay in the map.
   const std::vector<ClosedLoop>& closed_loops() const { return closed_loops_; }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -41,9 +43,24 @@ double TurnOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
   return turn;
 }
 
+using SeenLandmark = std::pair<LandmarkId, std::vector<BundleObservation>>;
+
+// Those of the longest tracks, which know most, by id; of equally long ones those of lower id.
+std::vector<SeenLandmark> LongestTracks(std::map<LandmarkId, std::vector<BundleObservation>> seen, size_t max_num) {
+  std::vector<SeenLandmark> tracks;
+  for (auto& [id, observations] : seen) {
+    if (observations.size() >= kMinObservers) tracks.emplace_back(id, std::move(observations));
+  }
+  if (tracks.size() <= max_num) return tracks;
+  std::ranges::stable_sort(tracks, std::greater<>(), [](const SeenLandmark& track) { return track.second.size(); });
+  tracks.resize(max_num);
+  std::ranges::sort(tracks, {}, &SeenLandmark::first);
+  return tracks;
+}
+
 // The first pose is held, and how far from it the one is that stands at a quarter of the way: what is older than the
 // window hangs on its beginning.
-BundleProblem ProblemOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
+BundleProblem ProblemOf(const Map& map, const std::vector<KeyframeId>& keyframes, size_t max_landmarks) {
   BundleProblem problem;
   problem.calibration = map.FindKeyframe(keyframes.front())->features->calibration;
   problem.scale_pose = static_cast<int>(keyframes.size() / 4);
@@ -57,12 +74,9 @@ BundleProblem ProblemOf(const Map& map, const std::vector<KeyframeId>& keyframes
       seen[keyframe.landmarks[i]].push_back({pose, -1, SeenAt(*keyframe.features, static_cast<int32_t>(i))});
     }
   }
-  for (auto& [id, observations] : seen) {
-    if (observations.size() < kMinObservers) continue;
-    for (BundleObservation& observation : observations) {
-      observation.point = static_cast<int>(problem.points.size());
-      problem.observations.push_back(observation);
-    }
+  for (auto& [id, observations] : LongestTracks(std::move(seen), max_landmarks)) {
+    for (BundleObservation& observation : observations) observation.point = static_cast<int>(problem.points.size());
+    problem.observations.insert(problem.observations.end(), observations.begin(), observations.end());
     problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
   }
   return problem;
@@ -74,32 +88,34 @@ bool IsError(const FocalEstimate& estimate) {
 
 }  // namespace
 
-void FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor) {
+bool FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor) {
   const Map& map = editor.map();
-  if (given.sensor != SensorType::kMono || next < next_look_ || map.FindKeyframe(map.answered()) == nullptr) return;
+  if (given.sensor != SensorType::kMono || next < next_look_ || map.FindKeyframe(map.answered()) == nullptr)
+    return false;
   const std::vector<KeyframeId> keyframes = NewestKeyframes(map);
   next_look_ = {next.value + kMinInterval};
-  if (keyframes.size() < kMinKeyframes || TurnOf(map, keyframes) < kMinTurn_rad) return;
-  const BundleProblem problem = ProblemOf(map, keyframes);
-  const std::optional<FocalEstimate> found = EstimateFocal(problem);
+  if (keyframes.size() < kMinKeyframes || TurnOf(map, keyframes) < kMinTurn_rad) return false;
+  const std::optional<FocalEstimate> found = EstimateFocal(ProblemOf(map, keyframes, max_landmarks_));
   const bool is_error = found && IsError(*found);
   interval_ = is_error ? kMinInterval : std::clamp(2 * interval_, kMinInterval, kMaxInterval);
   next_look_ = {next.value + interval_};
   const std::optional<FocalEstimate> before = std::exchange(before_, is_error ? found : std::nullopt);
-  if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return;
-  const FocalLengths focal = ScaledFocal(problem.calibration, found->error);
+  if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return false;
+  const FocalLengths focal = ScaledFocal(WithFocal(given, map.focal()), found->error);
   const double total = focal.fx_px / given.fx_px - 1.0;
   (std::abs(total) <= kMaxError ? error_ : doubt_) = total;
-  if (std::abs(total) <= kMaxError) Change(focal, problem, editor);
+  return std::abs(total) <= kMaxError && Change(focal, keyframes, editor);
 }
 
-void FocalRefiner::Change(const FocalLengths& focal, BundleProblem problem, MapEditor& editor) {
+bool FocalRefiner::Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
+  BundleProblem problem = ProblemOf(editor.map(), keyframes, std::numeric_limits<size_t>::max());
   problem.calibration = WithFocal(problem.calibration, focal);
   const std::optional<BundleResult> adjusted = AdjustBundle(problem, GlobalBundleOptions());
-  if (!adjusted) return;
+  if (!adjusted) return false;
   before_.reset();
   editor.ChangeFocal(focal);
   WriteBack(problem, *adjusted, editor);
+  return true;
 }
 
 }  // namespace tessera

@@ -3,10 +3,11 @@
 // map, by 10 % in one of 90 degrees with an error of 2 % (KITTI 03).
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "map/map_editor.h"
-#include "optimization/bundle_adjustment.h"
 #include "optimization/focal_estimation.h"
 
 namespace tessera {
@@ -15,9 +16,12 @@ namespace tessera {
 // needed to change anything.
 class FocalRefiner {
  public:
+  // A look takes in as many landmarks, those that most of the keyframes observe.
+  explicit FocalRefiner(size_t max_landmarks = 1500) : max_landmarks_(max_landmarks) {}
+
   // To be called before keyframe `next` is added; `given`: the calibration that keyframes come with. Where focal
-  // lengths change, the newest keyframes and their landmarks are adjusted to them.
-  void Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor);
+  // lengths change, the newest keyframes and their landmarks are adjusted to them, and the answer is true.
+  bool Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor);
 
   // By which share of the given focal lengths the map's differ from them, as found here; 0: they don't.
   double error() const { return error_; }
@@ -25,8 +29,9 @@ class FocalRefiner {
   double doubt() const { return doubt_; }
 
  private:
-  void Change(const FocalLengths& focal, BundleProblem problem, MapEditor& editor);
+  bool Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor);
 
+  size_t max_landmarks_;
   KeyframeId next_look_;
   int64_t interval_ = 0;                 // keyframes between looks
   std::optional<FocalEstimate> before_;  // what the last look found, if it was a clear error

@@ -70,7 +70,7 @@ Mapper::Mapper(const MapperOptions& options) : options_(options), keyframe_culle
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
-  if (options_.refines_focal) focal_refiner_.Refine(seen.id, seen.features.calibration, editor);
+  if (options_.refines_focal) RefineFocal(seen, editor);
   Insert(seen, editor);
   RememberMotion(seen);
   ObserveLandmarks(seen, editor);
@@ -138,6 +138,14 @@ bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId n
   return applies;
 }
 
+// Poses move: what loops and an adjustment under way are measured against is gone.
+void Mapper::RefineFocal(const KeyframeObservation& seen, MapEditor& editor) {
+  if (!focal_refiner_.Refine(seen.id, seen.features.calibration, editor)) return;
+  last_corrected_ = seen.id;
+  is_base_outdated_ = base_.has_value();
+  wants_adjustment_ |= is_base_outdated_;
+}
+
 bool Mapper::AskForAdjustment(KeyframeId now) {
   if (!wants_adjustment_ || base_) return false;
   base_ = TakeBase(map_);
@@ -154,12 +162,11 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
     throw std::invalid_argument("keyframe " + std::to_string(seen.id.value) +
                                 " is not new, or its lists do not fit its keypoints");
   }
-  auto features = std::make_shared<FeatureFrame>(seen.features);
-  features->calibration = WithFocal(features->calibration, map_.focal());
   const std::optional<Sim3> world_from_reference = removed_.Find(map_, seen.reference);
   const Sim3 world_from_keyframe =
       world_from_reference ? *world_from_reference * seen.reference_from_camera : Sim3::From(seen.world_from_camera);
-  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe, std::move(features));
+  editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe,
+                     std::make_shared<const FeatureFrame>(map_.Calibrated(seen.features)));
 }
 
 void Mapper::RememberMotion(const KeyframeObservation& seen) {

@@ -74,6 +74,7 @@ class Mapper {
   bool ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor);
   bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
+  void RefineFocal(const KeyframeObservation& seen, MapEditor& editor);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void RememberMotion(const KeyframeObservation& seen);

@@ -95,7 +95,8 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
-  const auto view = ViewOf(features);
+  const auto view = std::make_shared<const FrameView>(replica_.map().Calibrated(features));
+  calibration_ = features.calibration;
   const State before = state();
   MapTrackingResult result = UndecidedResult(*view);
   if (last_) UpdateLast();
@@ -135,13 +136,6 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
 MapTracker::State MapTracker::state() const {
   if (!last_ && !has_map()) return State::kInitializing;
   return lost_since_us_ || !last_ ? State::kLost : State::kTracking;
-}
-
-// As the map's camera sees it.
-std::shared_ptr<const FrameView> MapTracker::ViewOf(const FeatureFrame& features) const {
-  FeatureFrame seen = features;
-  seen.calibration = WithFocal(seen.calibration, replica_.map().focal());
-  return std::make_shared<const FrameView>(std::move(seen));
 }
 
 MapTrackingResult MapTracker::UndecidedResult(const FrameView& view) const {
@@ -596,6 +590,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   KeyframeObservation keyframe;
   keyframe.id = next_keyframe_;
   keyframe.features = frame.view->features();
+  keyframe.features.calibration = calibration_;
   keyframe.world_from_camera = frame.world_from_camera;
   keyframe.reference = reference;
   keyframe.reference_from_camera = reference_from_camera;

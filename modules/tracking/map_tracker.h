@@ -115,7 +115,6 @@ class MapTracker {
     StepEvidence evidence = StepEvidence::kStrong;
   };
 
-  std::shared_ptr<const FrameView> ViewOf(const FeatureFrame& features) const;
   MapTrackingResult UndecidedResult(const FrameView& view) const;
   void CountPoints(PoseEstimate& pose) const;
   void DescribePose(MapTrackingResult& result);
@@ -158,6 +157,7 @@ class MapTracker {
 
   const MapTrackerOptions options_;
   MapReplica replica_;
+  CameraCalibration calibration_;  // that the source's frames bring
   MonoInitializer initializer_;
   KeyframeDecision decision_;
   std::optional<Last> last_;                     // nullopt: no part of the map is followed

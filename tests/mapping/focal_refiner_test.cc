@@ -37,7 +37,7 @@ class MiscalibratedMap {
   SyntheticWorld world_;
   PlantedMap planted_;
   CameraCalibration given_;
-  FocalRefiner refiner_;
+  FocalRefiner refiner_{12000};  // each keyframe turns by little
   MapDelta delta_;
 };
 
