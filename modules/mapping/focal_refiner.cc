@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "map/spanning_tree.h"
-#include "measurement/keypoint_measurement.h"
 #include "optimization/local_adjustment.h"
 
 namespace tessera {
@@ -43,42 +42,33 @@ double TurnOf(const Map& map, const std::vector<KeyframeId>& keyframes) {
   return turn;
 }
 
-using SeenLandmark = std::pair<LandmarkId, std::vector<BundleObservation>>;
-
-// Those of the longest tracks, which know most, by id; of equally long ones those of lower id.
-std::vector<SeenLandmark> LongestTracks(std::map<LandmarkId, std::vector<BundleObservation>> seen, size_t max_num) {
-  std::vector<SeenLandmark> tracks;
-  for (auto& [id, observations] : seen) {
-    if (observations.size() >= kMinObservers) tracks.emplace_back(id, std::move(observations));
+// Landmarks that at least kMinObservers of the keyframes observe, by id: at most `max_num`, those of the longest
+// tracks, which know most; of equally long ones those of lower id.
+std::vector<LandmarkId> LongestTracks(const Map& map, const std::vector<KeyframeId>& keyframes, size_t max_num) {
+  std::map<LandmarkId, size_t> num_observers;
+  for (const KeyframeId id : keyframes) {
+    for (const LandmarkId landmark : map.FindKeyframe(id)->landmarks) {
+      if (landmark.valid()) ++num_observers[landmark];
+    }
+  }
+  std::vector<LandmarkId> tracks;
+  for (const auto& [id, num] : num_observers) {
+    if (num >= kMinObservers) tracks.push_back(id);
   }
   if (tracks.size() <= max_num) return tracks;
-  std::ranges::stable_sort(tracks, std::greater<>(), [](const SeenLandmark& track) { return track.second.size(); });
+  std::ranges::stable_sort(tracks, std::greater<>(), [&](LandmarkId id) { return num_observers.at(id); });
   tracks.resize(max_num);
-  std::ranges::sort(tracks, {}, &SeenLandmark::first);
+  std::ranges::sort(tracks);
   return tracks;
 }
 
 // The first pose is held, and how far from it the one is that stands at a quarter of the way: what is older than the
 // window hangs on its beginning.
 BundleProblem ProblemOf(const Map& map, const std::vector<KeyframeId>& keyframes, size_t max_landmarks) {
-  BundleProblem problem;
-  problem.calibration = map.FindKeyframe(keyframes.front())->features->calibration;
+  const LocalWindow window{.inner = keyframes, .landmarks = LongestTracks(map, keyframes, max_landmarks)};
+  BundleProblem problem = BuildLocalProblem(map, window, {});
+  for (size_t i = 0; i < problem.poses.size(); ++i) problem.poses[i].is_fixed = i == 0;
   problem.scale_pose = static_cast<int>(keyframes.size() / 4);
-  std::map<LandmarkId, std::vector<BundleObservation>> seen;
-  for (const KeyframeId id : keyframes) {
-    const Keyframe& keyframe = *map.FindKeyframe(id);
-    const int pose = static_cast<int>(problem.poses.size());
-    problem.poses.push_back({id, keyframe.world_from_camera.Inverse(), pose == 0});
-    for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
-      if (!keyframe.landmarks[i].valid()) continue;
-      seen[keyframe.landmarks[i]].push_back({pose, -1, SeenAt(*keyframe.features, static_cast<int32_t>(i))});
-    }
-  }
-  for (auto& [id, observations] : LongestTracks(std::move(seen), max_landmarks)) {
-    for (BundleObservation& observation : observations) observation.point = static_cast<int>(problem.points.size());
-    problem.observations.insert(problem.observations.end(), observations.begin(), observations.end());
-    problem.points.push_back({id, map.FindLandmark(id)->position_in_world});
-  }
   return problem;
 }
 
