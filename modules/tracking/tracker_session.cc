@@ -1,8 +1,15 @@
 #include "tracking/tracker_session.h"
 
+#include <cmath>
 #include <utility>
 
 namespace tessera {
+namespace {
+
+// By which share a map's focal lengths may differ from those of its camera's calibration: more than any correction.
+constexpr double kMaxFocalError = 0.05;
+
+}  // namespace
 
 TrackerSession::TrackerSession(const MapTrackerOptions& options, std::unique_ptr<TrackerTime> time,
                                bool begins_with_map)
@@ -68,8 +75,9 @@ TrackerActions TrackerSession::Advance() {
 // The map that the session begins with, if any, must have been made with this camera.
 bool TrackerSession::FitsMap(const CameraCalibration& camera) {
   if (fits_map_ || tracker_.map().keyframes().size() == 0) return true;
-  fits_map_ = true;
-  const CameraCalibration seen = WithFocal(camera, tracker_.map().focal());
+  const FocalLengths& focal = tracker_.map().focal();
+  fits_map_ = !focal.is_known() || std::abs(camera.fx_px - focal.fx_px) <= kMaxFocalError * focal.fx_px;
+  const CameraCalibration seen = WithFocal(camera, focal);
   tracker_.map().keyframes().ForEach(
       [&](KeyframeId, const Keyframe& keyframe) { fits_map_ &= keyframe.features->calibration == seen; });
   return fits_map_;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <random>
 
+#include "map/map_editor.h"
 #include "mapping/mapper.h"
 #include "support/synthetic_world.h"
 
@@ -221,6 +222,21 @@ TEST(TrackerSession, AMapOfAnotherCameraIsRefusedForGood) {
   EXPECT_EQ(stack.Receive(other), State::kFailed);
   EXPECT_TRUE(stack.session.Advance().empty());
   EXPECT_TRUE(stack.poses.empty());
+}
+
+TEST(TrackerSession, AMapOfOtherFocalLengthsFitsTheCameraThatItCorrectsAndNoOther) {
+  Map map;
+  ASSERT_TRUE(map.Apply(*SavedMap()));
+  MapEditor editor(map);
+  editor.ChangeFocal({490.0, 490.0});
+  (void)editor.Finish(map.answered());
+  for (const double fx_px : {500.0, 600.0}) {
+    Stack stack(Logical(), true);
+    ASSERT_TRUE(stack.session.Receive(std::make_shared<const MapDelta>(map.Snapshot())));
+    FeatureFrame features = stack.world.Take(0).features;
+    features.calibration.fx_px = features.calibration.fy_px = fx_px;
+    EXPECT_EQ(stack.Receive(features) == State::kFailed, fx_px == 600.0);
+  }
 }
 
 TEST(TrackerSession, ARepeatedFrameIsIgnored) {
