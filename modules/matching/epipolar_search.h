@@ -47,7 +47,7 @@ struct EpipolarOptions {
 //   n (k + 0.2) / (N + 10)
 //
 // others would be found by chance: the number of false alarms (Desolneux, Moisan, Morel, "Meaningful Alignments", IJCV
-// 2000). A fixed distance means another thing for each keypoint; stages/mapper/README.md has figures for both.
+// 2000). A fixed distance means another thing for each keypoint; stages/mapper/MEASUREMENTS.md has figures for both.
 //
 // Where the segment's far end lies beside the second image, a far point has no true match: what is found for it is
 // false, and always too near. In an open bend, where skylines turn into view, most pairs were such ones, and the scale
