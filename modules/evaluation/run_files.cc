@@ -117,15 +117,16 @@ std::optional<Statistics> SummarizeFrames(const std::vector<FrameRecord>& frames
 std::string FramesCsv(const RunRecord& record) {
   std::string text =
       "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,"
-      "num_deltas,is_step_doubtful,scale_sigma\n";
+      "num_deltas,is_step_doubtful,scale_sigma,map_part\n";
   for (const FrameRecord& frame : record.Frames()) {
     const PoseEstimate& pose = frame.pose;
     char row[256];
-    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%s,%d,%d,%d,%d,%d,%" PRId64 ",%d,%.3f\n",
+    std::snprintf(row, sizeof row, "%" PRId64 ",%" PRId64 ",%s,%s,%s,%s,%d,%d,%d,%d,%d,%" PRId64 ",%d,%.3f,%s\n",
                   pose.frame.value, pose.utime_us, StateText(pose.state), MillisecondsText(frame.pose_time_ms).c_str(),
                   MillisecondsText(frame.latency_ms).c_str(), MillisecondsText(frame.map_wait_ms).c_str(),
                   pose.num_features, pose.num_matches, pose.num_inliers, pose.num_landmarks, pose.is_keyframe ? 1 : 0,
-                  pose.num_deltas, pose.is_step_doubtful ? 1 : 0, pose.scale_sigma);
+                  pose.num_deltas, pose.is_step_doubtful ? 1 : 0, pose.scale_sigma,
+                  pose.map_part.valid() ? std::to_string(pose.map_part.value).c_str() : "");
     text += row;
   }
   return text;

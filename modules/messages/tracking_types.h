@@ -27,6 +27,7 @@ struct PoseEstimate {
   Rigid3 world_from_camera;       // valid if tracked. Mono: units of the map
   KeyframeId reference_keyframe;  // the keyframe that the pose is stored relative to
   Rigid3 reference_from_camera;   // pose in its units: what is left true when it moves (Keyframe::scale)
+  KeyframeId map_part;            // the root of its part of the map (map/spanning_tree.h); invalid unless tracked
   int32_t num_features = 0;       // keypoints of the frame
   int32_t num_matches = 0;        // matched to landmarks
   int32_t num_inliers = 0;        // of those, consistent with the pose

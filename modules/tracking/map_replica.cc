@@ -1,5 +1,6 @@
 #include "tracking/map_replica.h"
 
+#include "map/spanning_tree.h"
 #include "measurement/landmark_description.h"
 
 namespace tessera {
@@ -21,6 +22,15 @@ std::optional<Sim3> MapReplica::WorldFromKeyframe(KeyframeId id) const {
   const std::optional<Sim3> world_from_ancestor = removed_.Find(map_, id);
   if (!world_from_ancestor) return std::nullopt;
   return *world_from_ancestor * ancestor_from_keyframe;
+}
+
+KeyframeId MapReplica::PartOf(KeyframeId id) const {
+  for (auto sent = sent_.find(id); sent != sent_.end(); sent = sent_.find(id)) {
+    if (!sent->second.reference.valid()) return id;
+    id = sent->second.reference;
+  }
+  const KeyframeId successor = removed_.Successor(map_, id);
+  return successor.valid() ? RootOf(map_, successor) : KeyframeId{};
 }
 
 std::optional<Landmark> MapReplica::Find(const PointId& id) const {

@@ -32,6 +32,8 @@ class MapReplica {
   // Keyframe::WorldFromKeyframe of a keyframe of the map, one that was removed from it, or one on its way, which has
   // the units of its reference.
   std::optional<Sim3> WorldFromKeyframe(KeyframeId id) const;
+  // The root of the map part of such a keyframe. Invalid if it never was.
+  KeyframeId PartOf(KeyframeId id) const;
   // The point in world coordinates; nullopt if it is gone.
   std::optional<Landmark> Find(const PointId& id) const;
   // The same point under its present name: its landmark once the mapper answered. Invalid if it is gone.

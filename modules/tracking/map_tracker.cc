@@ -165,6 +165,7 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
   result.pose.world_from_camera = last_->frame.world_from_camera;
   result.pose.reference_keyframe = reference_;
   result.pose.reference_from_camera = last_->reference_from_camera;
+  result.pose.map_part = replica_.PartOf(reference_);
   if (result.pose.num_inliers == 0) CountPoints(result.pose);  // a map begins: its first points
   result.pose.is_keyframe = !result.keyframes.empty();
   result.pose.is_step_doubtful = last_->is_doubtful;

@@ -79,6 +79,7 @@ struct Layout<pose_t> {
     fields(message.world_from_camera, pose.world_from_camera);
     fields(message.reference_keyframe, pose.reference_keyframe);
     fields(message.reference_from_camera, pose.reference_from_camera);
+    fields(message.map_part, pose.map_part);
     fields.Count(message.num_features, pose.num_features);
     fields.Count(message.num_matches, pose.num_matches);
     fields.Count(message.num_inliers, pose.num_inliers);

@@ -43,6 +43,7 @@ class RunFilesTest : public testing::Test {
       pose.num_landmarks = 900;
       pose.is_keyframe = i == 1;
       pose.scale_sigma = i == 1 ? 0.25 : 0.0;
+      if (i == 1) pose.map_part = KeyframeId{0};
       pose.num_deltas = i / 2;
       pose.map_wait_us = i / 2 * 6000;
       record.AddPose(pose, 1'010'000 + 4'000 * i);
@@ -162,10 +163,10 @@ TEST_F(RunFilesTest, TrajectorySaysThatItsPartsAreNotJoined) {
 TEST_F(RunFilesTest, FramesCsvHasARowPerFrame) {
   EXPECT_EQ(FramesCsv(SmallRun()),
             "frame,utime_us,state,pose_time_ms,latency_ms,map_wait_ms,features,matches,inliers,landmarks,is_keyframe,"
-            "num_deltas,is_step_doubtful,scale_sigma\n"
-            "0,1403636584763555,initializing,,10.000,0.000,2000,50,40,900,0,0,0,0.000\n"
-            "1,1403636584763556,tracked,4.000,14.000,0.000,2000,50,40,900,1,0,0,0.250\n"
-            "2,1403636584763557,lost,4.000,18.000,6.000,2000,50,40,900,0,1,0,0.000\n");
+            "num_deltas,is_step_doubtful,scale_sigma,map_part\n"
+            "0,1403636584763555,initializing,,10.000,0.000,2000,50,40,900,0,0,0,0.000,\n"
+            "1,1403636584763556,tracked,4.000,14.000,0.000,2000,50,40,900,1,0,0,0.250,0\n"
+            "2,1403636584763557,lost,4.000,18.000,6.000,2000,50,40,900,0,1,0,0.000,\n");
 }
 
 TEST_F(RunFilesTest, LoopsCsvHasARowPerLoop) {

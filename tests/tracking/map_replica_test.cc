@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "map/map_editor.h"
+#include "map/spanning_tree.h"
 #include "support/map_changes.h"
 #include "support/matchers.h"
 
@@ -100,6 +101,28 @@ TEST(MapReplica, ACulledReferenceLeavesItsPose) {
   ASSERT_THAT(replica.Apply(owner.Correct()), IsSuccess());
   ExpectNear(replica.WorldFromKeyframe({1}).value(), kCorrection * Sim3::From(kStep, 1.25));
   ExpectNear(replica.WorldFromKeyframe({2}).value(), kCorrection * before);
+}
+
+// As a controller must know it: the part of a pose is named by the keyframe that it began with, until it is joined to
+// an older one.
+TEST(MapReplica, PartsAreNamedByTheirRoots) {
+  Owner owner;
+  MapReplica replica;
+  ASSERT_THAT(replica.Apply(owner.first()), IsSuccess());
+  replica.Send({2}, {{}, kStep, {}});
+  replica.Send({3}, {{2}, kStep, {}});
+  EXPECT_EQ(replica.PartOf({1}), KeyframeId{0});
+  EXPECT_EQ(replica.PartOf({3}), KeyframeId{2});
+  EXPECT_FALSE(replica.PartOf({4}).valid());
+
+  ASSERT_THAT(replica.Apply(owner.Edit(
+                  [](MapEditor& editor) { editor.AddKeyframe({2}, {}, Sim3::From(kStep), PlainFeatures(2, 3)); }, {2})),
+              IsSuccess());
+  EXPECT_EQ(replica.PartOf({3}), KeyframeId{2});
+  ASSERT_THAT(replica.Apply(owner.Edit([](MapEditor& editor) { AttachTree({2}, {1}, editor); }, {2})), IsSuccess());
+  EXPECT_EQ(replica.PartOf({3}), KeyframeId{0});
+  ASSERT_THAT(replica.Apply(owner.Edit([](MapEditor& editor) { editor.RemoveKeyframe({1}); }, {2})), IsSuccess());
+  EXPECT_EQ(replica.PartOf({1}), KeyframeId{0});
 }
 
 // The mapper gives the keyframe the pose that the replica took for it.

@@ -198,9 +198,13 @@ TEST(MapTracker, ANewPartTakesOverScaleAndPositionFromTheMotionBeforeTheLoss) {
       ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
     }
     if (result.pose.state == TrackingState::kTracked) (step < 25 ? before : after).push_back(result.pose);
+    if (result.pose.state == TrackingState::kLost) EXPECT_FALSE(result.pose.map_part.valid());
   }
   ASSERT_GT(before.size(), 10U);
   ASSERT_GT(after.size(), 10U);
+  EXPECT_EQ(before.back().map_part, KeyframeId{0});
+  EXPECT_GT(after.front().map_part, KeyframeId{0});
+  EXPECT_EQ(after.back().map_part, after.front().map_part);
   const auto length = [](const PoseEstimate& a, const PoseEstimate& b) {
     return (b.world_from_camera.translation - a.world_from_camera.translation).norm() /
            static_cast<double>(b.frame.value - a.frame.value);
