@@ -68,6 +68,15 @@ bool WriteEntry(int file, const std::string& channel, ByteView message, int64_t 
          static_cast<ssize_t>(front.size() + message.size());
 }
 
+// What others have to write is small and precious: trajectories, the summary. Journals leave it this much of the disk.
+constexpr uintmax_t kMaxReserveBytes = 64'000'000, kReserveShare = 32;
+
+bool IsNearlyFull(const std::string& path) {
+  std::error_code unknown;
+  const std::filesystem::space_info disk = std::filesystem::space(path, unknown);
+  return !unknown && disk.available < std::min(kMaxReserveBytes, disk.capacity / kReserveShare);
+}
+
 [[noreturn]] void ThrowUnusable(const std::string& path) {
   throw InputError("the journal " + path + " can't be used (" + std::strerror(errno) +
                    "): check the folder and the room on the disk, or do without by stream.journal_dir=\"\": a killed "
@@ -152,6 +161,7 @@ Result<> Journal::Append(const std::string& channel, ByteView message, int64_t a
   num_bytes_ += static_cast<int64_t>(EntryBytes(channel, message));
   if (num_bytes_ > max_bytes_) return GiveUp("it would be larger than stream.journal_mb");
   if (!WriteEntry(file_, channel, message, arrival_us)) return GiveUp(std::strerror(errno));
+  if (IsNearlyFull(path_)) return GiveUp("the disk is nearly full");
   return {};
 }
 

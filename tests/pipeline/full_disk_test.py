@@ -11,19 +11,21 @@ from helpers.stack import Finished, Tessera
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Of 12 MB, less than the recording of the sequence takes."""
+def small_disk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Path]:
+    """Of as many megabytes as the test says."""
     if os.geteuid() != 0:
         pytest.skip("only root can mount a file system of a few megabytes")
     folder = tmp_path / "disk"
     folder.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=12m", "none", folder], capture_output=True, text=True)
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={request.param}m", "none", folder], capture_output=True, text=True)
     if mounted.returncode != 0:
         pytest.skip(f"this machine mounts no tmpfs: {mounted.stderr.strip()}")
     yield folder
     subprocess.run(["umount", folder], check=True)
 
 
+# Less than the recording of the sequence takes.
+@pytest.mark.parametrize("small_disk", [12], indirect=True)
 def test_a_full_disk_costs_no_trajectory(
     tessera: Tessera, sequence: Path, small_disk: Path, reference_run: Finished
 ) -> None:
@@ -39,3 +41,20 @@ def test_a_full_disk_costs_no_trajectory(
     finished.folder = out
     assert finished.summary["ended"] == "complete"
     assert any("recording" in sentence for sentence in finished.summary["not_written"])
+
+
+# Less than the journals of its processes take.
+@pytest.mark.parametrize("small_disk", [3], indirect=True)
+def test_journals_leave_room_for_the_results(
+    tessera: Tessera, sequence: Path, small_disk: Path, reference_run: Finished
+) -> None:
+    out = small_disk / "run"
+    options = ("--extractors", 1, "--port", tessera.next_port(), "--out", out)
+    finished = tessera.command("run", f"kitti:{sequence}", *options)
+    assert finished.err == ""
+    assert "is given up (the disk is nearly full)" in finished.out
+    assert (out / "trajectory.txt").read_text() == (reference_run.folder / "trajectory.txt").read_text()
+    finished.folder = out
+    assert finished.summary["ended"] == "complete"
+    for name in ("keyframes.txt", "frames.csv", "settings.yaml"):
+        assert (out / name).stat().st_size > 0
