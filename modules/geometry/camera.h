@@ -56,6 +56,14 @@ struct FocalLengths {
   bool operator==(const FocalLengths&) const = default;
 };
 
+// By which share a camera's focal length may differ from its calibration; beyond it, something else is wrong.
+inline constexpr double kMaxFocalError = 0.03;
+
+// By which share of the calibration's they differ from it; 0 where none are known.
+inline double FocalError(const FocalLengths& focal, const CameraCalibration& calibration) {
+  return focal.is_known() ? focal.fx_px / calibration.fx_px - 1.0 : 0.0;
+}
+
 // The calibration with these focal lengths; itself where none are known.
 inline CameraCalibration WithFocal(CameraCalibration calibration, const FocalLengths& focal) {
   if (focal.is_known()) std::tie(calibration.fx_px, calibration.fy_px) = std::pair(focal.fx_px, focal.fy_px);

@@ -23,7 +23,6 @@ constexpr double kMinTurn_rad = 0.6;     // in all, of the keyframes
 constexpr double kMinError = 0.005;      // of a focal length, to be worth a change
 constexpr double kMinSigmas = 5.0;       // and beyond doubt
 constexpr double kMaxSigmasApart = 3.0;  // two looks
-constexpr double kMaxError = 0.03;       // against the calibration: beyond it, something else is wrong with the images
 
 // The newest keyframes of the newest part of the map.
 std::vector<KeyframeId> NewestKeyframes(const Map& map) {
@@ -80,6 +79,7 @@ bool IsError(const FocalEstimate& estimate) {
 
 bool FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor) {
   const Map& map = editor.map();
+  error_ = FocalError(map.focal(), given);
   if (given.sensor != SensorType::kMono || next < next_look_ || map.FindKeyframe(map.answered()) == nullptr)
     return false;
   const std::vector<KeyframeId> keyframes = NewestKeyframes(map);
@@ -92,18 +92,21 @@ bool FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEd
   const std::optional<FocalEstimate> before = std::exchange(before_, is_error ? found : std::nullopt);
   if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return false;
   const FocalLengths focal = ScaledFocal(WithFocal(given, map.focal()), found->error);
-  const double total = focal.fx_px / given.fx_px - 1.0;
-  (std::abs(total) <= kMaxError ? error_ : doubt_) = total;
-  return std::abs(total) <= kMaxError && Change(focal, keyframes, editor);
+  const double total = FocalError(focal, given);
+  if (std::abs(total) <= kMaxFocalError) return Change(focal, given, keyframes, editor);
+  doubt_ = total;
+  return false;
 }
 
-bool FocalRefiner::Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
+bool FocalRefiner::Change(const FocalLengths& focal, const CameraCalibration& given,
+                          const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
   BundleProblem problem = ProblemOf(editor.map(), keyframes, std::numeric_limits<size_t>::max());
   problem.calibration = WithFocal(problem.calibration, focal);
   const std::optional<BundleResult> adjusted = AdjustBundle(problem, GlobalBundleOptions());
   if (!adjusted) return false;
   before_.reset();
   editor.ChangeFocal(focal);
+  error_ = FocalError(focal, given);
   WriteBack(problem, *adjusted, editor);
   return true;
 }

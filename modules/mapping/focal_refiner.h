@@ -23,13 +23,14 @@ class FocalRefiner {
   // lengths change, the newest keyframes and their landmarks are adjusted to them, and the answer is true.
   bool Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor);
 
-  // By which share of the given focal lengths the map's differ from them, as found here; 0: they don't.
+  // By which share of the given focal lengths the map's differ from them, found here or before the map was loaded.
   double error() const { return error_; }
   // Likewise what was found but not used, since no calibration is as wrong as that; 0: nothing.
   double doubt() const { return doubt_; }
 
  private:
-  bool Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor);
+  bool Change(const FocalLengths& focal, const CameraCalibration& given, const std::vector<KeyframeId>& keyframes,
+              MapEditor& editor);
 
   size_t max_landmarks_;
   KeyframeId next_look_;

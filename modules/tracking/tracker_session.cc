@@ -4,12 +4,6 @@
 #include <utility>
 
 namespace tessera {
-namespace {
-
-// By which share a map's focal lengths may differ from those of its camera's calibration: more than any correction.
-constexpr double kMaxFocalError = 0.05;
-
-}  // namespace
 
 TrackerSession::TrackerSession(const MapTrackerOptions& options, std::unique_ptr<TrackerTime> time,
                                bool begins_with_map)
@@ -76,7 +70,7 @@ TrackerActions TrackerSession::Advance() {
 bool TrackerSession::FitsMap(const CameraCalibration& camera) {
   if (fits_map_ || tracker_.map().keyframes().size() == 0) return true;
   const FocalLengths& focal = tracker_.map().focal();
-  fits_map_ = !focal.is_known() || std::abs(camera.fx_px - focal.fx_px) <= kMaxFocalError * focal.fx_px;
+  fits_map_ = std::abs(FocalError(focal, camera)) <= kMaxFocalError;
   const CameraCalibration seen = WithFocal(camera, focal);
   tracker_.map().keyframes().ForEach(
       [&](KeyframeId, const Keyframe& keyframe) { fits_map_ &= keyframe.features->calibration == seen; });

@@ -28,6 +28,14 @@ class MiscalibratedMap {
     return planted_.map();
   }
 
+  // What another refiner says of the map, as one does that was loaded.
+  double ErrorOfLoadedMap() {
+    FocalRefiner later;
+    MapEditor editor(planted_.map());
+    later.Refine({0}, given_, editor);
+    return later.error();
+  }
+
   double true_fx() const { return world_.calibration().fx_px; }
   PlantedMap& planted() { return planted_; }
   const FocalRefiner& refiner() const { return refiner_; }
@@ -53,6 +61,7 @@ TEST(FocalRefiner, CorrectsWhatTwoLooksAgreeOn) {
   EXPECT_NEAR(map.focal().fx_px, miscalibrated.true_fx(), 0.004 * miscalibrated.true_fx());
   EXPECT_NEAR(miscalibrated.refiner().error(), 1.0 / 1.02 - 1.0, 0.004);
   EXPECT_EQ(miscalibrated.refiner().doubt(), 0.0);
+  EXPECT_EQ(miscalibrated.ErrorOfLoadedMap(), miscalibrated.refiner().error());
   EXPECT_LT(miscalibrated.planted().WorstKeyframe(map), 0.5);
   ASSERT_TRUE(replica.Apply(miscalibrated.delta()));
   EXPECT_EQ(replica.Sha256Hex(), map.Sha256Hex());
