@@ -53,6 +53,11 @@ class Section {
     return static_cast<int>(number);
   }
 
+  std::string Text(const std::string& key) const {
+    if (!node_[key].IsScalar()) Complain(key, "must be a word");
+    return node_[key].Scalar();
+  }
+
   std::vector<double> Numbers(const std::string& key) const {
     std::vector<double> numbers;
     if (!node_[key].IsSequence()) {
@@ -87,6 +92,11 @@ PinholeCamera ReadPinhole(const Section& section) {
   if (section.Has("distortion")) {
     camera.distortion = section.Numbers("distortion");
   }
+  if (section.Has("distortion_model")) {
+    const std::optional<LensModel> lens = ParseLensModel(section.Text("distortion_model"));
+    if (!lens) section.Complain("distortion_model", "must be radial-tangential or equidistant");
+    camera.lens = *lens;
+  }
   return camera;
 }
 
@@ -119,7 +129,7 @@ void ReadRightCamera(const Section& section, const std::string& path, CameraRig&
     rig = RectifiedPair(rig.left, baseline_m);
   } else if (section.Has("right")) {
     const Section right(path, "right.", section.Child("right"),
-                        {"fx_px", "fy_px", "cx_px", "cy_px", "distortion", "right_from_left"});
+                        {"fx_px", "fy_px", "cx_px", "cy_px", "distortion", "distortion_model", "right_from_left"});
     rig.right = ReadPinhole(right);
     rig.right->width_px = rig.left.width_px;
     rig.right->height_px = rig.left.height_px;
@@ -137,8 +147,8 @@ CameraRig LoadCalibrationFile(const std::string& path) {
     throw InputError("calibration file " + path + " is not valid YAML: " + error.what());
   }
   const Section section(path, "", document,
-                        {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion", "depth_unit_m",
-                         "baseline_m", "right", "base_from_camera"});
+                        {"width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion",
+                         "distortion_model", "depth_unit_m", "baseline_m", "right", "base_from_camera"});
   if (section.Has("base_from_camera")) ReadRigid(section, "base_from_camera");  // used by whoever tells poses
   CameraRig rig;
   rig.left = ReadPinhole(section);

@@ -6,10 +6,11 @@
 //   fy_px: 457.296
 //   cx_px: 367.215
 //   cy_px: 248.375
-//   distortion: [k1, k2, p1, p2]   # radial-tangential (camera_rig.h); 4, 5 or 8 numbers; optional
+//   distortion: [k1, k2, p1, p2]   # 4, 5 or 8 numbers; optional
+//   distortion_model: equidistant  # a fisheye lens: k1 k2 k3 k4; else radial-tangential (camera_rig.h)
 //   depth_unit_m: 0.001            # RGB-D: meters per count of the depth image
 //   baseline_m: 0.54               # stereo, images rectified already: distance of the cameras; if they are not:
-//   right:                         # the right camera: fx_px, fy_px, cx_px, cy_px, distortion, and
+//   right:                         # the right camera: fx_px, fy_px, cx_px, cy_px, distortion ..., and
 //     right_from_left: [...]       #   12 numbers, [R | t] row by row, t in meters: x_right = R x_left + t
 #pragma once
 

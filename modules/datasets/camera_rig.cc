@@ -4,6 +4,12 @@
 
 namespace tessera {
 
+std::optional<LensModel> ParseLensModel(const std::string& name) {
+  if (name == "radial-tangential" || name == "radtan") return LensModel::kRadialTangential;
+  if (name == "equidistant") return LensModel::kEquidistant;
+  return std::nullopt;
+}
+
 Result<> PinholeCamera::Check() const {
   if (!(fx_px > 0.0) || !(fy_px > 0.0) || !std::isfinite(fx_px) || !std::isfinite(fy_px)) {
     return Failed("focal lengths must be positive");
@@ -15,6 +21,10 @@ Result<> PinholeCamera::Check() const {
     return Failed("width and height must both be positive or both be left out");
   }
   const size_t count = distortion.size();
+  if (lens == LensModel::kEquidistant) {
+    return count == 4 ? Result<>() : Failed("equidistant distortion must have 4 numbers (k1 k2 k3 k4), not " +
+                                            std::to_string(count));
+  }
   if (count != 0 && count != 4 && count != 5 && count != 8) {
     return Failed("distortion must have 4, 5 or 8 numbers (k1 k2 p1 p2 k3 k4 k5 k6), not " + std::to_string(count));
   }

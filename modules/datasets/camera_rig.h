@@ -11,12 +11,23 @@
 
 namespace tessera {
 
-// Pinhole with radial-tangential distortion (Brown's model in OpenCV's form).
-// With x = X/Z, y = Y/Z, r2 = x^2 + y^2:
+// What a lens makes of the direction x = X/Z, y = Y/Z. With r = sqrt(x^2 + y^2):
 //
-//   c  = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
-//   u  = fx (x c + 2 p1 x y + p2 (r2 + 2 x^2)) + cx           [px]
-//   v  = fy (y c + p1 (r2 + 2 y^2) + 2 p2 x y) + cy           [px]
+// Radial-tangential (Brown's model in OpenCV's form):
+//   c  = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
+//   u  = fx (x c + 2 p1 x y + p2 (r^2 + 2 x^2)) + cx          [px]
+//   v  = fy (y c + p1 (r^2 + 2 y^2) + 2 p2 x y) + cy          [px]
+//
+// Equidistant, for fisheye lenses (J. Kannala, S. Brandt, "A Generic Camera Model and Calibration Method for
+// Conventional, Wide-Angle, and Fish-Eye Lenses", PAMI 2006), with t = atan(r):
+//   c  = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) / r
+//   u  = fx x c + cx                                          [px]
+//   v  = fy y c + cy                                          [px]
+enum class LensModel { kRadialTangential, kEquidistant };
+
+// "radial-tangential" or "radtan" (Kalibr), "equidistant"; nullopt: another.
+std::optional<LensModel> ParseLensModel(const std::string& name);
+
 struct PinholeCamera {
   int width_px = 0;  // 0: as the images are
   int height_px = 0;
@@ -24,7 +35,8 @@ struct PinholeCamera {
   double fy_px = 0.0;
   double cx_px = 0.0;
   double cy_px = 0.0;
-  std::vector<double> distortion;  // k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
+  std::vector<double> distortion;  // k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none. Equidistant: k1 k2 k3 k4
+  LensModel lens = LensModel::kRadialTangential;
 
   // Fails if a value is out of range.
   Result<> Check() const;

@@ -48,9 +48,10 @@ Rigid3 ReadBodyFromSensor(const YAML::Node& document, const std::string& path) {
 Sensor ParseSensorFile(const YAML::Node& document, const std::string& path) {
   const auto model = document["camera_model"].as<std::string>("pinhole");
   const auto distortion = document["distortion_model"].as<std::string>("radial-tangential");
-  if (model != "pinhole" || (distortion != "radial-tangential" && distortion != "radtan")) {
+  const std::optional<LensModel> lens = ParseLensModel(distortion);
+  if (model != "pinhole" || !lens) {
     throw InputError("file " + path + ": camera model " + model + " with " + distortion +
-                     " distortion is not supported: only pinhole with radial-tangential is");
+                     " distortion is not supported: only pinhole with radial-tangential or equidistant is");
   }
   const std::vector<double> intrinsics = Numbers(document["intrinsics"], "intrinsics", path);
   const std::vector<double> resolution = Numbers(document["resolution"], "resolution", path);
@@ -67,6 +68,7 @@ Sensor ParseSensorFile(const YAML::Node& document, const std::string& path) {
   sensor.camera.cx_px = intrinsics[2];
   sensor.camera.cy_px = intrinsics[3];
   sensor.camera.distortion = Numbers(document["distortion_coefficients"], "distortion_coefficients", path);
+  sensor.camera.lens = *lens;
   ThrowIfFailed<InputError>(sensor.camera.Check(), "file " + path + ": ");
   sensor.body_from_sensor = ReadBodyFromSensor(document, path);
   return sensor;

@@ -33,17 +33,30 @@ bool IsRectifiedPair(const CameraRig& rig) {
          move.translation.y() == 0.0 && move.translation.z() == 0.0;
 }
 
+// Where in the original image each pixel of the new one lies, in OpenCV's maps of that type.
+void MapPixels(const PinholeCamera& camera, const cv::Mat& new_from_camera, const cv::Mat& new_camera, int type,
+               cv::Mat& map1, cv::Mat& map2) {
+  const cv::Mat matrix = CameraMatrix(camera);
+  const cv::Size size(camera.width_px, camera.height_px);
+  if (camera.lens == LensModel::kEquidistant) {
+    cv::fisheye::initUndistortRectifyMap(matrix, camera.distortion, new_from_camera, new_camera, size, type, map1, map2);
+  } else {
+    cv::initUndistortRectifyMap(matrix, camera.distortion, new_from_camera, new_camera, size, type, map1, map2);
+  }
+}
+
 // Whether each pixel of the new image comes from inside the original one.
 bool SeesOnlyImage(const PinholeCamera& camera, const cv::Mat& rotation, const cv::Mat& new_camera) {
   cv::Mat x_px, y_px;
-  cv::initUndistortRectifyMap(CameraMatrix(camera), camera.distortion, rotation, new_camera,
-                              cv::Size(camera.width_px, camera.height_px), CV_32FC1, x_px, y_px);
+  MapPixels(camera, rotation, new_camera, CV_32FC1, x_px, y_px);
   return cv::checkRange(x_px, true, nullptr, 0.0, camera.width_px - 1 + 1e-3) &&
          cv::checkRange(y_px, true, nullptr, 0.0, camera.height_px - 1 + 1e-3);
 }
 
 // OpenCV fits the new image into the original at a few points of its border only, so that up to two pixels
 // beside them stay black. This narrows the view until none is.
+constexpr double kNoBorder = 0.0;   // cv::stereoRectify's alpha: so large that nothing beside the images is seen
+constexpr double kOwnFocal = -1.0;  // likewise: the focal length stays
 constexpr double kZoomStep = 1.002;
 constexpr int kMaxZoomSteps = 200;
 
@@ -57,8 +70,7 @@ void ZoomIn(cv::Mat& projection) {
 
 RemapTable TableOf(const PinholeCamera& camera, const cv::Mat& rotation, const cv::Mat& new_camera) {
   cv::Mat whole, fraction;
-  cv::initUndistortRectifyMap(CameraMatrix(camera), camera.distortion, rotation, new_camera,
-                              cv::Size(camera.width_px, camera.height_px), CV_16SC2, whole, fraction);
+  MapPixels(camera, rotation, new_camera, CV_16SC2, whole, fraction);
   return {whole, fraction, camera.width_px, camera.height_px};
 }
 
@@ -86,7 +98,10 @@ Rectifier::~Rectifier() = default;
 
 void Rectifier::PrepareSingle(const CameraRig& rig) {
   const cv::Size size(rig.left.width_px, rig.left.height_px);
-  cv::Mat matrix = cv::getOptimalNewCameraMatrix(CameraMatrix(rig.left), rig.left.distortion, size, 0.0, size);
+  cv::Mat matrix = CameraMatrix(rig.left);
+  if (rig.left.lens != LensModel::kEquidistant) {
+    matrix = cv::getOptimalNewCameraMatrix(matrix, rig.left.distortion, size, 0.0, size);
+  }
   // OpenCV would squeeze the two directions differently; features rely on patches that turn and scale evenly.
   const double scale = std::max(matrix.at<double>(0, 0) / rig.left.fx_px, matrix.at<double>(1, 1) / rig.left.fy_px);
   matrix.at<double>(0, 0) = scale * rig.left.fx_px;
@@ -114,9 +129,13 @@ void Rectifier::PreparePair(const CameraRig& rig) {
   }
   const cv::Size size(rig.left.width_px, rig.left.height_px);
   cv::Mat rectified_from_left, rectified_from_right, left_projection, right_projection, unused;
-  cv::stereoRectify(CameraMatrix(rig.left), rig.left.distortion, CameraMatrix(*rig.right), rig.right->distortion, size,
-                    cv_rotation, cv_translation, rectified_from_left, rectified_from_right, left_projection,
-                    right_projection, unused, cv::CALIB_ZERO_DISPARITY, 0.0, size);
+  const bool is_fisheye =
+      rig.left.lens == LensModel::kEquidistant || rig.right->lens == LensModel::kEquidistant;
+  const std::vector<double> none;
+  cv::stereoRectify(CameraMatrix(rig.left), is_fisheye ? none : rig.left.distortion, CameraMatrix(*rig.right),
+                    is_fisheye ? none : rig.right->distortion, size, cv_rotation, cv_translation, rectified_from_left,
+                    rectified_from_right, left_projection, right_projection, unused, cv::CALIB_ZERO_DISPARITY,
+                    is_fisheye ? kOwnFocal : kNoBorder, size);
   for (int step = 0; step < kMaxZoomSteps && !(SeesOnlyImage(rig.left, rectified_from_left, left_projection) &&
                                                SeesOnlyImage(*rig.right, rectified_from_right, right_projection));
        ++step) {

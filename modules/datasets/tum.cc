@@ -119,7 +119,7 @@ std::string Describe(const PinholeCamera& camera) {
   std::ostringstream text;
   text << "fx=" << camera.fx_px << " fy=" << camera.fy_px << " cx=" << camera.cx_px << " cy=" << camera.cy_px << " px";
   if (!camera.distortion.empty()) {
-    text << ", distortion";
+    text << (camera.lens == LensModel::kEquidistant ? ", equidistant distortion" : ", distortion");
     for (const double coefficient : camera.distortion) text << ' ' << coefficient;
   }
   return text.str();

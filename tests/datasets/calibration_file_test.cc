@@ -39,6 +39,15 @@ TEST(CalibrationFile, ReadsEveryKey) {
   EXPECT_LT((point_in_right - Eigen::Vector3d(0.75, 3.5, -1.25)).norm(), 1e-12);
 }
 
+TEST(CalibrationFile, KnowsFisheyeLenses) {
+  const DatasetFolder folder;
+  const std::string fisheye = "distortion: [0.1, 0.2, 0.3, 0.4]\ndistortion_model: equidistant\n";
+  folder.Write("c.yaml", kPinhole + fisheye);
+  EXPECT_EQ(LoadCalibrationFile(folder.path("c.yaml")).left.lens, LensModel::kEquidistant);
+  folder.Write("c.yaml", std::string(kPinhole) + "distortion: [0.1, 0.2, 0.3, 0.4]\n");
+  EXPECT_EQ(LoadCalibrationFile(folder.path("c.yaml")).left.lens, LensModel::kRadialTangential);
+}
+
 TEST(CalibrationFile, BaselineStandsForARectifiedPair) {
   const DatasetFolder folder;
   folder.Write("c.yaml", std::string(kPinhole) + "baseline_m: 0.54\n");
@@ -65,6 +74,8 @@ TEST(CalibrationFile, BadFilesGetASentence) {
   expect("fx_px: -1\nfy_px: 401\ncx_px: 320\ncy_px: 240\n", "focal lengths");
   expect(std::string(kPinhole) + "distortion: [1, 2]\n", "4, 5 or 8");
   expect(std::string(kPinhole) + "distortion: 3\n", "`distortion`");
+  expect(std::string(kPinhole) + "distortion_model: omnidirectional\n", "radial-tangential or equidistant");
+  expect(std::string(kPinhole) + "distortion_model: equidistant\n", "must have 4 numbers");
   expect(std::string(kPinhole) + "width_px: 640\n", "`height_px` is missing");
   expect(std::string(kPinhole) + "baseline_m: -1\n", "`baseline_m`");
   expect(std::string(kPinhole) + "depth_unit_m: -1\n", "`depth_unit_m`");

@@ -27,6 +27,10 @@ TEST(PinholeCamera, NeedsFocalLengthsAPrincipalPointAndWholeDistortion) {
   }
   camera.distortion.assign(3, 0.01);
   EXPECT_THAT(camera.Check(), IsFailure(HasSubstr("not 3")));
+  camera.lens = LensModel::kEquidistant;
+  EXPECT_THAT(camera.Check(), IsFailure(HasSubstr("must have 4 numbers (k1 k2 k3 k4), not 3")));
+  camera.distortion.assign(4, 0.01);
+  EXPECT_THAT(camera.Check(), IsSuccess());
 }
 
 TEST(CameraRig, NeedsWhatItsSensorMeasuresWith) {

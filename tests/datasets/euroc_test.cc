@@ -120,12 +120,21 @@ TEST_F(EurocTest, TheFolderMav0ItselfWillDo) {
   EXPECT_EQ(OpenSource(options)->num_frames(), 4);
 }
 
+// As in the TUM visual-inertial benchmark.
+TEST_F(EurocTest, FisheyeLensesAreUndistorted) {
+  for (const char* camera : {"cam0", "cam1"}) {
+    Replace(std::string("mav0/") + camera + "/sensor.yaml", "radial-tangential", "equidistant");
+  }
+  EXPECT_NEAR(OpenSource(Options(SensorType::kMono))->calibration().fx_px, 60.0, 1e-9);
+  EXPECT_GT(OpenSource(Options(SensorType::kStereo))->calibration().baseline_m, 0.0);
+}
+
 TEST_F(EurocTest, BadFilesAreRefused) {
   ExpectRefused({"no depth"}, SensorType::kRgbd);
   const std::string sensor = "mav0/cam0/sensor.yaml", table = "mav0/cam0/data.csv";
   const std::string good_sensor = folder_.Read(sensor), good_table = folder_.Read(table);
-  Replace(sensor, "radial-tangential", "equidistant");
-  ExpectRefused({folder_.path(sensor), "equidistant"});
+  Replace(sensor, "radial-tangential", "omnidirectional");
+  ExpectRefused({folder_.path(sensor), "omnidirectional"});
   folder_.Write(sensor, good_sensor);
   Replace(sensor, "intrinsics: [60.0, ", "intrinsics: [");
   ExpectRefused({folder_.path(sensor), "`intrinsics`"});

@@ -18,8 +18,26 @@ CameraRig WideAnglePair() {
   return rig;
 }
 
-// The camera model as camera_rig.h states it.
+// The fisheye pair of the TUM visual-inertial benchmark, about: 512x512, of 195 degrees.
+CameraRig FisheyePair() {
+  CameraRig rig;
+  rig.left = {512, 512, 190.98, 190.97, 254.93, 256.90, {0.00348, 0.00072, -0.00205, 0.00020}, LensModel::kEquidistant};
+  rig.right = {512, 512, 190.44, 190.43, 252.60, 254.92, {0.0034, 0.0018, -0.0027, 0.00033}, LensModel::kEquidistant};
+  rig.right_from_left = {ExpSO3({0.0141, -0.0010, 0.0023}), {-0.1011, -0.0020, -0.0010}};
+  return rig;
+}
+
+// The camera models as camera_rig.h states them.
+Eigen::Vector2d ProjectFisheye(const PinholeCamera& camera, const Eigen::Vector3d& point) {
+  const double x = point.x() / point.z(), y = point.y() / point.z(), r = std::hypot(x, y), t = std::atan(r);
+  const std::vector<double>& d = camera.distortion;
+  const double t2 = t * t;
+  const double c = r < 1e-9 ? 1.0 : t * (1.0 + t2 * (d[0] + t2 * (d[1] + t2 * (d[2] + t2 * d[3])))) / r;
+  return {camera.fx_px * x * c + camera.cx_px, camera.fy_px * y * c + camera.cy_px};
+}
+
 Eigen::Vector2d ProjectDistorted(const PinholeCamera& camera, const Eigen::Vector3d& point) {
+  if (camera.lens == LensModel::kEquidistant) return ProjectFisheye(camera, point);
   const double x = point.x() / point.z(), y = point.y() / point.z(), r2 = x * x + y * y;
   const std::vector<double>& d = camera.distortion;
   const double radial = 1.0 + d[0] * r2 + d[1] * r2 * r2;
@@ -67,8 +85,12 @@ TEST(Rectifier, PassesUndistortedImagesUnchanged) {
   EXPECT_THAT(stereo.calibration().Check(), IsSuccess());
 }
 
-TEST(Rectifier, MonoImageIsThatOfThePinhole) {
-  const CameraRig rig = WideAnglePair();
+// Wide-angle and fisheye pairs alike.
+class RectifierOf : public testing::TestWithParam<CameraRig (*)()> {};
+INSTANTIATE_TEST_SUITE_P(Lens, RectifierOf, testing::Values(WideAnglePair, FisheyePair));
+
+TEST_P(RectifierOf, MonoImageIsThatOfThePinhole) {
+  const CameraRig rig = GetParam()();
   const Rectifier rectifier(rig, SensorType::kMono);
   for (const Eigen::Vector3d& point : kPoints) {
     const GrayImage image = rectifier.Left(DrawSpot(rig.left, ProjectDistorted(rig.left, point)));
@@ -76,8 +98,8 @@ TEST(Rectifier, MonoImageIsThatOfThePinhole) {
   }
 }
 
-TEST(Rectifier, PairSeesPointsInOneRowWithTheDisparityOfTheirDepth) {
-  const CameraRig rig = WideAnglePair();
+TEST_P(RectifierOf, PairSeesPointsInOneRowWithTheDisparityOfTheirDepth) {
+  const CameraRig rig = GetParam()();
   const Rectifier rectifier(rig, SensorType::kStereo);
   const CameraCalibration& calibration = rectifier.calibration();
   EXPECT_NEAR(calibration.baseline_m, rig.right_from_left.translation.norm(), 1e-9);
@@ -92,10 +114,11 @@ TEST(Rectifier, PairSeesPointsInOneRowWithTheDisparityOfTheirDepth) {
   }
 }
 
-TEST(Rectifier, LeavesNoBlackBorder) {
+TEST_P(RectifierOf, LeavesNoBlackBorder) {
+  const CameraRig rig = GetParam()();
   for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
-    const Rectifier rectifier(WideAnglePair(), sensor);
-    const GrayImage white(752, 480, 255);
+    const Rectifier rectifier(rig, sensor);
+    const GrayImage white(rig.left.width_px, rig.left.height_px, 255);
     const GrayImage left = rectifier.Left(white);
     EXPECT_EQ(*std::min_element(left.pixels.begin(), left.pixels.end()), 255) << ToString(sensor);
     if (sensor == SensorType::kStereo) {
@@ -103,6 +126,14 @@ TEST(Rectifier, LeavesNoBlackBorder) {
       EXPECT_EQ(*std::min_element(right.pixels.begin(), right.pixels.end()), 255);
     }
   }
+}
+
+// Else it would be blurred for a view to the sides that is stretched beyond use.
+TEST(Rectifier, TheMiddleOfAFisheyeImageKeepsItsResolution) {
+  const Rectifier mono(FisheyePair(), SensorType::kMono);
+  EXPECT_NEAR(mono.calibration().fx_px, 190.98, 1.0);
+  const Rectifier stereo(FisheyePair(), SensorType::kStereo);
+  EXPECT_NEAR(stereo.calibration().fx_px, 190.43, 1.0);
 }
 
 TEST(Rectifier, NeverMixesDepths) {
