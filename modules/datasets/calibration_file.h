@@ -20,7 +20,8 @@
 
 namespace tessera {
 
-// Reads such a file. Throws InputError with file and key if a key is unknown, missing or out of range.
+// Reads such a file, or one that Kalibr or ROS wrote (foreign_calibration.h). Throws InputError with file and key if a
+// key is unknown, missing or out of range.
 CameraRig LoadCalibrationFile(const std::string& path);
 
 }  // namespace tessera

@@ -5,8 +5,10 @@
 namespace tessera {
 
 std::optional<LensModel> ParseLensModel(const std::string& name) {
-  if (name == "radial-tangential" || name == "radtan") return LensModel::kRadialTangential;
-  if (name == "equidistant") return LensModel::kEquidistant;
+  for (const char* known : {"radial-tangential", "radtan", "plumb_bob", "rational_polynomial"}) {
+    if (name == known) return LensModel::kRadialTangential;
+  }
+  if (name == "equidistant" || name == "fisheye") return LensModel::kEquidistant;
   return std::nullopt;
 }
 
@@ -22,8 +24,9 @@ Result<> PinholeCamera::Check() const {
   }
   const size_t count = distortion.size();
   if (lens == LensModel::kEquidistant) {
-    return count == 4 ? Result<>() : Failed("equidistant distortion must have 4 numbers (k1 k2 k3 k4), not " +
-                                            std::to_string(count));
+    return count == 4
+               ? Result<>()
+               : Failed("equidistant distortion must have 4 numbers (k1 k2 k3 k4), not " + std::to_string(count));
   }
   if (count != 0 && count != 4 && count != 5 && count != 8) {
     return Failed("distortion must have 4, 5 or 8 numbers (k1 k2 p1 p2 k3 k4 k5 k6), not " + std::to_string(count));

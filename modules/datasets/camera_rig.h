@@ -25,7 +25,7 @@ namespace tessera {
 //   v  = fy y c + cy                                          [px]
 enum class LensModel { kRadialTangential, kEquidistant };
 
-// "radial-tangential" or "radtan" (Kalibr), "equidistant"; nullopt: another.
+// By the names that EuRoC, Kalibr and ROS have for it, such as "radial-tangential" and "equidistant"; nullopt: another.
 std::optional<LensModel> ParseLensModel(const std::string& name);
 
 struct PinholeCamera {
@@ -45,9 +45,10 @@ struct PinholeCamera {
 // One camera, or a pair.
 struct CameraRig {
   PinholeCamera left;
-  std::optional<PinholeCamera> right;  // stereo
-  Rigid3 right_from_left;              // stereo: meters
-  double depth_unit_m = 0.0;           // RGB-D: meters per count; 0: unknown
+  std::optional<PinholeCamera> right;    // stereo
+  Rigid3 right_from_left;                // stereo: meters
+  double depth_unit_m = 0.0;             // RGB-D: meters per count; 0: unknown
+  std::optional<Rigid3> body_from_left;  // where the calibration says it: the body is what ground truth tells poses of
 
   // Fails if something that this kind of sensor needs is missing or out of range.
   Result<> Check(SensorType sensor) const;

@@ -1,5 +1,6 @@
 // EuRoC MAV sequences: mav0/cam0 and cam1 (sensor.yaml, data.csv, data/), and the pose of the body (IMU) in
-// mav0/state_groundtruth_estimate0/data.csv. T_BS of a sensor.yaml is body_from_sensor.
+// mav0/state_groundtruth_estimate0/data.csv. T_BS of a sensor.yaml is body_from_sensor. The TUM visual-inertial
+// benchmark has the same folders without sensor.yaml (the calibration is that of Kalibr), and the truth in mocap0.
 #include <yaml-cpp/yaml.h>
 
 #include <filesystem>
@@ -149,13 +150,39 @@ std::vector<int64_t> OpenImages(const fs::path& mav, SensorType sensor, Recordin
   return times_ns;
 }
 
+// The cameras of --camera, else those of the sequence.
+CameraRig ReadRig(const fs::path& mav, const SourceOptions& options) {
+  const fs::path left_path = mav / "cam0" / "sensor.yaml";
+  const bool is_given = !options.calibration_path.empty();
+  CameraRig rig = is_given ? LoadCalibrationFile(options.calibration_path) : CameraRig{};
+  if (is_given && !fs::exists(left_path)) return rig;
+  const Sensor left = ReadSensor(left_path);
+  rig.body_from_left = left.body_from_sensor;
+  if (is_given) return rig;
+  rig.left = left.camera;
+  if (options.sensor == SensorType::kStereo) {
+    const Sensor right = ReadSensor(mav / "cam1" / "sensor.yaml");
+    rig.right = right.camera;
+    rig.right_from_left = right.body_from_sensor.Inverse() * left.body_from_sensor;
+  }
+  return rig;
+}
+
 // world_from_left = world_from_body * body_from_left
-void ReadGroundTruth(const fs::path& path, const Rigid3& body_from_left, const std::vector<int64_t>& times_ns,
-                     Recording& recording) {
+void ReadGroundTruth(const fs::path& mav, const std::vector<int64_t>& times_ns, Recording& recording) {
+  const fs::path mocap = mav / "mocap0" / "data.csv";
+  const fs::path path = fs::exists(mocap) ? mocap : mav / "state_groundtruth_estimate0" / "data.csv";
   if (!fs::exists(path)) {
     recording.notes.push_back("No ground truth: " + path.string() + " does not exist.");
     return;
   }
+  if (!recording.rig.body_from_left) {
+    recording.notes.push_back("No ground truth: it tells where the body was, but neither " +
+                              (mav / "cam0" / "sensor.yaml").string() +
+                              " nor T_cam_imu of --camera says where the camera is on it.");
+    return;
+  }
+  const Rigid3& body_from_left = *recording.rig.body_from_left;
   const PoseTrack world_from_body = ReadBodyTrack(path);
   for (size_t i = 0; i < times_ns.size(); ++i) {
     if (const auto pose = world_from_body.At(times_ns[i])) {
@@ -183,19 +210,9 @@ Recording LoadEuroc(const std::string& folder, const SourceOptions& options) {
   }
   Recording recording;
   recording.times_path = mav / "cam0" / "data.csv";
-  const Sensor left = ReadSensor(mav / "cam0" / "sensor.yaml");
-  if (!options.calibration_path.empty()) {
-    recording.rig = LoadCalibrationFile(options.calibration_path);
-  } else {
-    recording.rig.left = left.camera;
-    if (is_stereo) {
-      const Sensor right = ReadSensor(mav / "cam1" / "sensor.yaml");
-      recording.rig.right = right.camera;
-      recording.rig.right_from_left = right.body_from_sensor.Inverse() * left.body_from_sensor;
-    }
-  }
+  recording.rig = ReadRig(mav, options);
   const std::vector<int64_t> times_ns = OpenImages(mav, options.sensor, recording);
-  ReadGroundTruth(mav / "state_groundtruth_estimate0" / "data.csv", left.body_from_sensor, times_ns, recording);
+  ReadGroundTruth(mav, times_ns, recording);
   return recording;
 }
 

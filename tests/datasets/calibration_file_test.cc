@@ -1,5 +1,6 @@
 #include "datasets/calibration_file.h"
 
+#include "datasets/calibration_section.h"
 #include "support/dataset_folder.h"
 #include "support/matchers.h"
 

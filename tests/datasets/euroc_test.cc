@@ -129,6 +129,31 @@ TEST_F(EurocTest, FisheyeLensesAreUndistorted) {
   EXPECT_GT(OpenSource(Options(SensorType::kStereo))->calibration().baseline_m, 0.0);
 }
 
+// As in the TUM visual-inertial benchmark, too: no sensor.yaml, Kalibr's calibration, truth by motion capture.
+TEST_F(EurocTest, KalibrsCalibrationStandsForTheSensorFiles) {
+  std::filesystem::remove(folder_.path("mav0/cam0/sensor.yaml"));
+  std::filesystem::create_directories(folder_.path("mav0/mocap0"));
+  std::filesystem::rename(folder_.path("mav0/state_groundtruth_estimate0/data.csv"),
+                          folder_.path("mav0/mocap0/data.csv"));
+  const std::string kalibr =
+      "cam0:\n  camera_model: pinhole\n  intrinsics: [60, 61, 40, 30]\n  resolution: [80, 60]\n"
+      "  distortion_model: equidistant\n  distortion_coeffs: [0.01, 0, 0, 0]\n";
+  folder_.Write("camchain.yaml", kalibr);
+  SourceOptions options = Options(SensorType::kMono);
+  options.calibration_path = folder_.path("camchain.yaml");
+  const auto blind = OpenSource(options);
+  EXPECT_TRUE(blind->ground_truth().empty());
+  EXPECT_NE(blind->notes().at(0).find("nor T_cam_imu of --camera"), std::string::npos) << blind->notes().at(0);
+
+  folder_.Write("camchain.yaml",
+                kalibr + "  T_cam_imu: [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]]\n");
+  const auto source = OpenSource(options);
+  ASSERT_FALSE(source->ground_truth().empty());
+  const GroundTruthPose& truth = source->ground_truth().front();
+  const Rigid3 body_from_camera = truth.world_from_camera.Inverse() * WorldFromBody(kStartNs);
+  EXPECT_LT((body_from_camera.translation - Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-5);
+}
+
 TEST_F(EurocTest, BadFilesAreRefused) {
   ExpectRefused({"no depth"}, SensorType::kRgbd);
   const std::string sensor = "mav0/cam0/sensor.yaml", table = "mav0/cam0/data.csv";

@@ -1,0 +1,42 @@
+// A map of a calibration file, which complains with the file's path and the full name of the key.
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "geometry/rigid3.h"
+
+namespace tessera {
+
+// Every reading function throws InputError if the key is missing or its value is of another kind.
+class CalibrationSection {
+ public:
+  // `prefix`: that of its keys in complaints, such as "right."; empty: the file itself. Throws InputError if the node
+  // is no map.
+  CalibrationSection(std::string path, std::string prefix, const YAML::Node& node);
+
+  // Throws InputError if there is any other key.
+  void Allow(std::initializer_list<const char*> keys) const;
+
+  bool Has(const std::string& key) const { return static_cast<bool>(node_[key]); }
+  CalibrationSection Child(const std::string& key) const;
+  double Number(const std::string& key) const;
+  int Integer(const std::string& key) const;
+  std::string Text(const std::string& key) const;
+  // As many numbers as asked for; 0: any. Rows of rows count as one list.
+  std::vector<double> Numbers(const std::string& key, size_t num = 0) const;
+  // 12 numbers, [R | t] row by row, or 16, with 0 0 0 1 as the last row; t in meters.
+  Rigid3 Transform(const std::string& key) const;
+
+  [[noreturn]] void Complain(const std::string& key, const std::string& problem) const;
+
+ private:
+  std::string path_;
+  std::string prefix_;
+  YAML::Node node_;
+};
+
+}  // namespace tessera
