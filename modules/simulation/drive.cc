@@ -1,6 +1,7 @@
 #include "simulation/drive.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -26,6 +27,9 @@ Eigen::Vector2d PointOn(const Polyline& points, double distance_m) {
   return points[i] + (position - static_cast<double>(i)) * (points[i + 1] - points[i]);
 }
 
+// 0 to 1 for t from 0 to 1, slow at both ends.
+double Ease(double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); }
+
 // How far someone looks aside who does so once in every kPeriodS: the tangent of half the angle, to the right.
 double AsideAt(double time_s, uint32_t seed) {
   constexpr double kPeriodS = 2.75;
@@ -37,9 +41,8 @@ double AsideAt(double time_s, uint32_t seed) {
   const double far = side * (is_wide ? random.Uniform(0.42, 0.52) : random.Uniform(0.24, 0.32));
   const double turn_s = is_wide ? random.Uniform(0.58, 0.68) : random.Uniform(0.42, 0.5);
   const double stay_s = std::min(random.Uniform(0.1, 0.5), kPeriodS - begin_s - 2.0 * turn_s);  // it is back in time
-  const auto ease = [](double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); };
   const double begin = number * kPeriodS + begin_s;
-  return far * (ease((time_s - begin) / turn_s) - ease((time_s - begin - turn_s - stay_s) / turn_s));
+  return far * (Ease((time_s - begin) / turn_s) - Ease((time_s - begin - turn_s - stay_s) / turn_s));
 }
 
 }  // namespace
@@ -191,6 +194,47 @@ Rigid3 HandTrajectory::WorldFromCamera(double time_s) const {
   const Eigen::Quaterniond shake =
       Eigen::Quaterniond(1.0, tremor(5), tremor(6), 0.05 * Wave(1.5 * round) + tremor(7)).normalized();
   return {(level.rotation * shake).normalized(), position};
+}
+
+RobotTrajectory::RobotTrajectory(const Eigen::Vector3d& room_m, double speed, uint32_t seed) : seed_(seed) {
+  constexpr double kSpeed_mps = 0.35, kQuarter_s = 1.57;
+  constexpr int kNumRounds = 2;
+  const double side = seed % 2 == 0 ? 1.0 : -1.0;  // it turns left or right
+  const double x = side * 0.235 * room_m.x(), z = 0.22 * room_m.z();
+  const std::array<Eigen::Vector2d, 4> corners{{{x, z}, {-x, z}, {-x, -z}, {x, -z}}};
+  const auto ahead_of = [&](int side_of_way) -> Eigen::Vector2d {
+    const size_t i = static_cast<size_t>(side_of_way) % 4;
+    return (corners[i] - corners[(i + 3) % 4]).normalized();
+  };
+  legs_.push_back({0.0, 0.0, corners[3], corners[3], ahead_of(0), ahead_of(0)});
+  for (int i = 0; i < 4 * kNumRounds; ++i) {
+    const Eigen::Vector2d& corner = corners[static_cast<size_t>(i) % 4];
+    Add((corner - legs_.back().to).norm() / (speed * kSpeed_mps), corner, ahead_of(i));
+    if (i % 2 == 1) {  // the long way around
+      Add(kQuarter_s / speed, corner, -ahead_of(i + 1));
+      Add(kQuarter_s / speed, corner, -ahead_of(i));
+    }
+    Add(kQuarter_s / speed, corner, ahead_of(i + 1));
+  }
+}
+
+void RobotTrajectory::Add(double duration_s, const Eigen::Vector2d& to, const Eigen::Vector2d& ahead_to) {
+  const Leg& last = legs_.back();
+  legs_.push_back({last.end_s, last.end_s + duration_s, last.to, to, last.ahead_to, ahead_to});
+}
+
+Rigid3 RobotTrajectory::WorldFromCamera(double time_s) const {
+  constexpr double kHeightM = 0.55, kAheadOfAxleM = 0.08;
+  const auto after = std::find_if(legs_.begin() + 1, legs_.end() - 1, [&](const Leg& l) { return time_s < l.end_s; });
+  const Leg& leg = *after;
+  const double t = Ease((time_s - leg.begin_s) / (leg.end_s - leg.begin_s));
+  const Eigen::Vector2d axle = leg.from + t * (leg.to - leg.from);
+  const Eigen::Vector2d ahead = (leg.ahead_from + t * (leg.ahead_to - leg.ahead_from)).normalized();
+  const Eigen::Vector2d position = axle + kAheadOfAxleM * ahead;
+  const auto rattle = [&](uint32_t axis) { return 0.001 * SmoothNoise(HashOf(seed_, 31, axis), 9.0 * time_s); };
+  const Rigid3 level = LookAlong({position.x(), -kHeightM + rattle(0), position.y()}, {ahead.x(), 0.0, ahead.y()});
+  const Eigen::Quaterniond shake = Eigen::Quaterniond(1.0, rattle(1), 0.0, rattle(2)).normalized();
+  return {(level.rotation * shake).normalized(), level.translation};
 }
 
 }  // namespace tessera

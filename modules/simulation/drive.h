@@ -90,6 +90,28 @@ class DeskTrajectory : public Trajectory {
   uint32_t seed_;
 };
 
+// A camera low on a wheeled robot that goes twice around the table in the middle of a room of this size: along a
+// rectangle, and at its corners it stops and turns where it stands, at every second one by 270 degrees.
+class RobotTrajectory : public Trajectory {
+ public:
+  // `speed` times the usual 0.35 m/s and, in turns, 1 rad/s.
+  RobotTrajectory(const Eigen::Vector3d& room_m, double speed, uint32_t seed);
+  double duration_s() const override { return legs_.back().end_s; }
+  Rigid3 WorldFromCamera(double time_s) const override;
+
+ private:
+  // Straight on, or a quarter of a turn. Positions and directions on the ground (x, z).
+  struct Leg {
+    double begin_s, end_s;
+    Eigen::Vector2d from, to;
+    Eigen::Vector2d ahead_from, ahead_to;
+  };
+  void Add(double duration_s, const Eigen::Vector2d& to, const Eigen::Vector2d& ahead_to);
+
+  std::vector<Leg> legs_;
+  uint32_t seed_;
+};
+
 // The camera at `position` that looks along `forward` with its y axis downwards; `forward` must not be vertical.
 Rigid3 LookAlong(const Eigen::Vector3d& position, const Eigen::Vector3d& forward);
 

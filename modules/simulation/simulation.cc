@@ -31,6 +31,7 @@ constexpr CameraModel kWalkCamera{640.0, 480.0, 525.0, 0.12, 0.008, 2.0, 0.0};
 const CameraModel& ModelOf(Scene scene) {
   switch (scene) {
     case Scene::kRoom:
+    case Scene::kRobot:
       return kHandCamera;
     case Scene::kWalk:
       return kWalkCamera;
@@ -121,11 +122,13 @@ SimulationOptions ParseSimulation(const std::string& text) {
   const std::string name = text.substr(0, text.find(','));
   const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort},
                                             {"room", Scene::kRoom},     {"country", Scene::kCountry},
-                                            {"walk", Scene::kWalk},     {"desk", Scene::kDesk}};
+                                            {"walk", Scene::kWalk},     {"desk", Scene::kDesk},
+                                            {"robot", Scene::kRobot}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
-                     " is unknown: give sim:street, sim:street-short, sim:room, sim:country, sim:walk or sim:desk");
+                     " is unknown: give sim:street, sim:street-short, sim:room, sim:country, sim:walk, sim:desk or "
+                     "sim:robot");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -156,6 +159,10 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
     }
     case Scene::kRoom:
       trajectory_ = std::make_unique<HandTrajectory>(kRoomM, options.duration_s, options.speed, options.seed);
+      world = BuildRoom(kRoomM, options.seed);
+      break;
+    case Scene::kRobot:
+      trajectory_ = std::make_unique<RobotTrajectory>(kRoomM, options.speed, options.seed);
       world = BuildRoom(kRoomM, options.seed);
       break;
     case Scene::kCountry: {

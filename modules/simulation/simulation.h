@@ -14,7 +14,7 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk, kDesk };
+  enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk, kDesk, kRobot };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;         // another seed, another town
   double length_m = 0.0;     // of a drive; 0: all of it
@@ -29,7 +29,7 @@ struct SimulationOptions {
   Result<> Check() const;
 };
 
-// Reads the name of a world (street, street-short, room, country, walk, desk) and options behind it:
+// Reads the name of a world (street, street-short, room, country, walk, desk, robot) and options behind it:
 // "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 
