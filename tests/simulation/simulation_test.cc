@@ -32,7 +32,8 @@ const Scene kScenes[] = {{"street", SensorType::kStereo, {10, 130, 300}},
                          {"room", SensorType::kRgbd, {10, 130, 300}},
                          {"country", SensorType::kMono, {150}},  // takes a second to paint
                          {"walk", SensorType::kStereo, {20}},
-                         {"desk", SensorType::kRgbd, {10, 150, 300}}};
+                         {"desk", SensorType::kRgbd, {10, 150, 300}},
+                         {"robot", SensorType::kMono, {10, 300}}};
 
 TEST(Simulation, AFrameIsTheSameWhateverWasRenderedBefore) {
   for (const Scene& scene : kScenes) {
