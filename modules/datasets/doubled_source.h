@@ -2,8 +2,9 @@
 //
 // Search radii and residuals have limits in pixels. Where the focal length is half as long, these let in twice the
 // angle, and with it corners that creep along with the image: the scale of mono fell by 5 % in 100 m. Yet the images of
-// such cameras show more than that: doubled, they do as well as larger ones (stages/tracker/MEASUREMENTS.md, "Small images").
-// SIFT doubles its images, too (D. Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004).
+// such cameras show more than that: doubled, they do as well as larger ones (stages/tracker/MEASUREMENTS.md, "Small
+// images"). SIFT doubles its images, too (D. Lowe, "Distinctive Image Features from Scale-Invariant Keypoints", IJCV
+// 2004).
 #pragma once
 
 #include <memory>

@@ -39,7 +39,8 @@ void MapPixels(const PinholeCamera& camera, const cv::Mat& new_from_camera, cons
   const cv::Mat matrix = CameraMatrix(camera);
   const cv::Size size(camera.width_px, camera.height_px);
   if (camera.lens == LensModel::kEquidistant) {
-    cv::fisheye::initUndistortRectifyMap(matrix, camera.distortion, new_from_camera, new_camera, size, type, map1, map2);
+    cv::fisheye::initUndistortRectifyMap(matrix, camera.distortion, new_from_camera, new_camera, size, type, map1,
+                                         map2);
   } else {
     cv::initUndistortRectifyMap(matrix, camera.distortion, new_from_camera, new_camera, size, type, map1, map2);
   }
@@ -129,8 +130,7 @@ void Rectifier::PreparePair(const CameraRig& rig) {
   }
   const cv::Size size(rig.left.width_px, rig.left.height_px);
   cv::Mat rectified_from_left, rectified_from_right, left_projection, right_projection, unused;
-  const bool is_fisheye =
-      rig.left.lens == LensModel::kEquidistant || rig.right->lens == LensModel::kEquidistant;
+  const bool is_fisheye = rig.left.lens == LensModel::kEquidistant || rig.right->lens == LensModel::kEquidistant;
   const std::vector<double> none;
   cv::stereoRectify(CameraMatrix(rig.left), is_fisheye ? none : rig.left.distortion, CameraMatrix(*rig.right),
                     is_fisheye ? none : rig.right->distortion, size, cv_rotation, cv_translation, rectified_from_left,

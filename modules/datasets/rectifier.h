@@ -3,8 +3,9 @@
 //
 // Mono, RGB-D: the same camera without distortion; focal lengths, in their old ratio, and principal point
 // chosen so that no pixel looks outside the original image. Stereo: Bouguet's rectification
-// (cv::stereoRectify), cropped likewise. A fisheye lens sees more than a pinhole can show: the middle of the image keeps its
-// resolution, and what lies too far aside is cut off (with a focal length of half the width: beyond 45 degrees). Intensities are interpolated, depth counts are not (remap_table.h).
+// (cv::stereoRectify), cropped likewise. A fisheye lens sees more than a pinhole can show: the middle of the image
+// keeps its resolution, and what lies too far aside is cut off (with a focal length of half the width: beyond 45
+// degrees). Intensities are interpolated, depth counts are not (remap_table.h).
 #pragma once
 
 #include <memory>

@@ -13,7 +13,8 @@ struct LocalWindowOptions {
   int min_shared_landmarks = 15;  // a keyframe that shares fewer with the center is no neighbor (as in ORB-SLAM)
   int max_outer_keyframes = 20;   // poses that constrain the window: those that see most of its landmarks
   // Outer poses move too, constrained by their poses relative to their neighbors, and see no points (the double
-  // window of Strasdat et al. 2011); else they stay, and see the window's points. stages/mapper/MEASUREMENTS.md has figures.
+  // window of Strasdat et al. 2011); else they stay, and see the window's points. stages/mapper/MEASUREMENTS.md has
+  // figures.
   bool is_double = false;
   size_t num_confirming = 4;  // landmarks that fewer keyframes observe follow the poses and don't move them
 

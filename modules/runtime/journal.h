@@ -27,7 +27,8 @@ class Journal {
 
   // Continues the journal PATH, or begins it: a life that starts at `epoch_us` then. The folder is made if it is not
   // there. A journal that would be larger than `max_bytes`, or that fills the disk but for a rest that is left to
-  // the results, is given up; so is one whose disk has broken since it was begun. Throws InputError if the file can't be begun.
+  // the results, is given up; so is one whose disk has broken since it was begun. Throws InputError if the file can't
+  // be begun.
   Journal(std::string path, int64_t epoch_us, int64_t max_bytes);
   ~Journal();
   Journal(const Journal&) = delete;

@@ -601,8 +601,8 @@ bool AreSame(const PoseEstimate& a, const PoseEstimate& b) {
          a.latency_us == b.latency_us && a.state == b.state && AreSamePose(a.world_from_camera, b.world_from_camera) &&
          a.reference_keyframe == b.reference_keyframe &&
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.map_part == b.map_part &&
-         a.num_features == b.num_features && a.num_matches == b.num_matches && a.num_inliers == b.num_inliers && a.num_landmarks == b.num_landmarks &&
-         a.is_keyframe == b.is_keyframe && a.is_relocalized == b.is_relocalized &&
+         a.num_features == b.num_features && a.num_matches == b.num_matches && a.num_inliers == b.num_inliers &&
+         a.num_landmarks == b.num_landmarks && a.is_keyframe == b.is_keyframe && a.is_relocalized == b.is_relocalized &&
          a.is_step_doubtful == b.is_step_doubtful && a.scale_sigma == b.scale_sigma &&
          a.relocalized_by == b.relocalized_by && a.num_deltas == b.num_deltas && a.is_live == b.is_live &&
          a.map_wait_us == b.map_wait_us && AreSameBody(a.body, b.body) && a.coverage == b.coverage &&

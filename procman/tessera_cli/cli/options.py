@@ -14,8 +14,9 @@ SOURCE is one of
   camera:N     V4L2 device /dev/videoN; needs --camera
   rtsp://...   network stream; needs --camera
   sim:NAME     a simulated world with exact truth: street, street-short, country, walk, room, desk or
-               robot; options after it: sim:street,seed=3,length=500 (also speed=, noise=, scale= as factors, duration= of room and
-               desk in s, readout= of a rolling shutter in ms, path=FILE of KITTI poses)
+               robot; options after it: sim:street,seed=3,length=500 (also speed=, noise=, scale= as
+               factors, duration= of room and desk in s, readout= of a rolling shutter in ms, path=FILE
+               of KITTI poses)
   log:FILE     a log recorded by `tessera record`, `tessera run --record` or lcm-logger
   bus:[URL]    frames that another program, such as lcm-logplayer, publishes; default: this stack's main bus
 """
