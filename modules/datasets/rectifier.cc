@@ -54,10 +54,11 @@ bool SeesOnlyImage(const PinholeCamera& camera, const cv::Mat& rotation, const c
          cv::checkRange(y_px, true, nullptr, 0.0, camera.height_px - 1 + 1e-3);
 }
 
-// OpenCV fits the new image into the original at a few points of its border only, so that up to two pixels
-// beside them stay black. This narrows the view until none is.
 constexpr double kNoBorder = 0.0;   // cv::stereoRectify's alpha: so large that nothing beside the images is seen
 constexpr double kOwnFocal = -1.0;  // likewise: the focal length stays
+
+// OpenCV fits the new image into the original at a few points of its border only, so that up to two pixels
+// beside them stay black. This narrows the view until none is.
 constexpr double kZoomStep = 1.002;
 constexpr int kMaxZoomSteps = 200;
 
