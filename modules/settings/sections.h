@@ -168,8 +168,7 @@ struct TrackerSettings {
   std::string replay_log;
   double max_lost_s = 0.0;
   double keyframe_min_share = 0.0;
-  double keyframe_min_share_stereo = 0.0;
-  double keyframe_min_share_rgbd = 0.0;
+  double keyframe_min_share_with_depth = 0.0;
   double keyframe_min_parallax_rad = 0.0;
   double keyframe_max_interval_s = 0.0;
 
@@ -182,8 +181,7 @@ struct TrackerSettings {
     field("replay_log", self.replay_log);
     field("max_lost_s", self.max_lost_s, Range{0, 1e6, "s"});
     field("keyframe_min_share", self.keyframe_min_share, Range{0.001, 0.999});
-    field("keyframe_min_share_stereo", self.keyframe_min_share_stereo, Range{0.001, 0.999});
-    field("keyframe_min_share_rgbd", self.keyframe_min_share_rgbd, Range{0.001, 0.999});
+    field("keyframe_min_share_with_depth", self.keyframe_min_share_with_depth, Range{0.001, 0.999});
     field("keyframe_min_parallax_rad", self.keyframe_min_parallax_rad, Range{1e-4, 3.1, "rad"});
     field("keyframe_max_interval_s", self.keyframe_max_interval_s, Range{0.001, 1e6, "s"});
   }

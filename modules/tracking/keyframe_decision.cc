@@ -18,23 +18,12 @@ bool IsKnown(const SeenPoint& point, const TrackedFrame& frame) {
 }  // namespace
 
 Result<> KeyframeDecisionOptions::Check() const {
-  for (const double share : {min_share, min_share_stereo, min_share_rgbd, min_first_share, min_still_share}) {
+  for (const double share : {min_share, min_share_with_depth, min_first_share, min_still_share}) {
     if (!(share > 0.0 && share < 1.0)) return Failed("the shares of a reference's points must be between 0 and 1");
   }
   if (!(max_turn_share > 0.0)) return Failed("max_turn_share must be positive");
   if (!(min_parallax_rad > 0.0) || max_interval_us < 1) return Failed("the limits of keyframes must be positive");
   return {};
-}
-
-double KeyframeDecisionOptions::MinShare(SensorType sensor) const {
-  switch (sensor) {
-    case SensorType::kStereo:
-      return min_share_stereo;
-    case SensorType::kRgbd:
-      return min_share_rgbd;
-    default:
-      return min_share;
-  }
 }
 
 void KeyframeDecision::Restart(const TrackedFrame& frame) {
@@ -98,7 +87,7 @@ bool KeyframeDecision::Decide(const TrackedFrame& frame, int64_t frame_interval_
     points_ = std::move(seen.points);
     std::sort(points_.begin(), points_.end());
   }
-  const double min_share = options_.MinShare(frame.view->calibration().sensor);
+  const double min_share = frame.view->baseline_m() > 0.0 ? options_.min_share_with_depth : options_.min_share;
   const bool has_lost_sight =
       is_first ? share < options_.min_first_share : NextShare(share, utime_us, frame_interval_us) < min_share;
   const bool lacks_near = near.num_known < options_.max_known_points && near.num_new > options_.min_new_points;

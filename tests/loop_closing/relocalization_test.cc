@@ -71,7 +71,7 @@ constexpr int64_t kFar = 44;  // steps: from there, nothing of the beginning is 
 MapTrackerOptions ShortSighted() {
   MapTrackerOptions options;
   options.search.max_local_keyframes = 2;
-  options.keyframes.min_share_stereo = 0.75;  // and these are near one another
+  options.keyframes.min_share_with_depth = 0.75;  // and these are near one another
   return options;
 }
 
@@ -222,7 +222,7 @@ TEST(Relocalization, ALoadedMapIsContinued) {
   ASSERT_TRUE(run.tracker.Track(features, nullptr, true).asks_relocalization);
   const RelocalizationAnswer answer = run.Ask(features);
   std::vector<KeyframeId> added;
-  for (int64_t step = 15; step < 45; ++step) {
+  for (int64_t step = 15; step < 35; ++step) {
     const MapTrackingResult result =
         step == 15 ? run.tracker.Track(features, &answer, false) : run.tracker.Track(run.Take(step));
     ASSERT_EQ(result.pose.state, TrackingState::kTracked) << step;

@@ -25,8 +25,7 @@ TEST(DefaultSettings, OfTheTracker) {
   EXPECT_EQ(settings.max_lost_s, 1e-6 * static_cast<double>(options.max_lost_us));
   EXPECT_EQ(settings.localize_only, !options.makes_keyframes);
   EXPECT_EQ(settings.keyframe_min_share, options.keyframes.min_share);
-  EXPECT_EQ(settings.keyframe_min_share_stereo, options.keyframes.min_share_stereo);
-  EXPECT_EQ(settings.keyframe_min_share_rgbd, options.keyframes.min_share_rgbd);
+  EXPECT_EQ(settings.keyframe_min_share_with_depth, options.keyframes.min_share_with_depth);
   EXPECT_EQ(settings.keyframe_min_parallax_rad, options.keyframes.min_parallax_rad);
   EXPECT_EQ(settings.keyframe_max_interval_s, 1e-6 * static_cast<double>(options.keyframes.max_interval_us));
 }

@@ -42,7 +42,7 @@ Settings SettingsOf(const RunFolder& folder, const std::string& tiles, const Ove
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
-  settings.Override("tracker.keyframe_min_share_stereo=0.9");  // a short way, and yet many keyframes
+  settings.Override("tracker.keyframe_min_share_with_depth=0.9");  // a short way, and yet many keyframes
   settings.Override("tracker.max_lost_s=0.3");
   settings.Override("mapper.loop_delay_keyframes=2");
   settings.Override("mapper.adjustment_delay_keyframes=4");

@@ -38,8 +38,8 @@ Settings SettingsOf(const RunFolder& folder, const std::string& tiles) {
   Settings settings = Settings::LoadDefaults(TESSERA_SOURCE_DIR "/config/default.yaml");
   settings.Override("dispatcher.tiles=" + tiles);
   settings.Override("features.num_features=600");
-  settings.Override("tracker.keyframe_min_share_stereo=0.95");  // a short way, and yet many keyframes
-  settings.Override("tracker.relocalize=false");                // nobody is there to answer
+  settings.Override("tracker.keyframe_min_share_with_depth=0.9");  // a short way, and yet many keyframes
+  settings.Override("tracker.relocalize=false");                   // nobody is there to answer
   settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());
   settings.Override("map_writer.path=" + folder.File("late.ply"));

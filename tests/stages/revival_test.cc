@@ -72,7 +72,7 @@ Settings SettingsOf(const RunFolder& folder, int64_t num_frames, double keyframe
   settings.Override("dispatcher.tiles=2x2");
   settings.Override("features.num_features=400");
   settings.Override("camera.last_frame=" + std::to_string(num_frames));
-  settings.Override("tracker.keyframe_min_share_stereo=" + std::to_string(keyframe_min_share));
+  settings.Override("tracker.keyframe_min_share_with_depth=" + std::to_string(keyframe_min_share));
   settings.Override("tracker.relocalize=false");  // nobody is there to answer
   settings.Override("mapper.close_loops=false");
   settings.Override("evaluator.out_dir=" + folder.path());

@@ -27,8 +27,7 @@ MapTrackerOptions OptionsFrom(const TrackerSettings& settings) {
   options.max_lost_us = std::llround(1e6 * settings.max_lost_s);
   options.makes_keyframes = !settings.localize_only;
   options.keyframes.min_share = settings.keyframe_min_share;
-  options.keyframes.min_share_stereo = settings.keyframe_min_share_stereo;
-  options.keyframes.min_share_rgbd = settings.keyframe_min_share_rgbd;
+  options.keyframes.min_share_with_depth = settings.keyframe_min_share_with_depth;
   options.keyframes.min_parallax_rad = settings.keyframe_min_parallax_rad;
   options.keyframes.max_interval_us = std::llround(1e6 * settings.keyframe_max_interval_s);
   return options;
