@@ -75,10 +75,11 @@ std::vector<double> CalibrationSection::Numbers(const std::string& key, size_t n
   return numbers;
 }
 
-Rigid3 CalibrationSection::Transform(const std::string& key) const {
+Rigid3 CalibrationSection::Transform(const std::string& key, size_t num) const {
   const std::vector<double> numbers = Numbers(key);
-  if (numbers.size() != 12 && numbers.size() != 16) {
-    Complain(key, "must have 12 numbers, [R | t] row by row, not " + std::to_string(numbers.size()));
+  if (numbers.size() != num) {
+    Complain(key, "must have " + std::to_string(num) + " numbers, [R | t] row by row, not " +
+                      std::to_string(numbers.size()));
   }
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers.data());
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();

@@ -28,8 +28,8 @@ class CalibrationSection {
   std::string Text(const std::string& key) const;
   // As many numbers as asked for; 0: any. Rows of rows count as one list.
   std::vector<double> Numbers(const std::string& key, size_t num = 0) const;
-  // 12 numbers, [R | t] row by row, or 16, with 0 0 0 1 as the last row; t in meters.
-  Rigid3 Transform(const std::string& key) const;
+  // [R | t] row by row, t in meters: 12 numbers, or 16 where a fourth row (0 0 0 1) must follow.
+  Rigid3 Transform(const std::string& key, size_t num = 12) const;
 
   [[noreturn]] void Complain(const std::string& key, const std::string& problem) const;
 

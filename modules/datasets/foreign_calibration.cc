@@ -34,9 +34,9 @@ CameraRig ReadKalibr(const CalibrationSection& file) {
   rig.left = ReadKalibrCamera(file.Child("cam0"));
   if (file.Has("cam1")) {
     rig.right = ReadKalibrCamera(file.Child("cam1"));
-    rig.right_from_left = file.Child("cam1").Transform("T_cn_cnm1");
+    rig.right_from_left = file.Child("cam1").Transform("T_cn_cnm1", 16);
   }
-  if (file.Child("cam0").Has("T_cam_imu")) rig.body_from_left = file.Child("cam0").Transform("T_cam_imu").Inverse();
+  if (file.Child("cam0").Has("T_cam_imu")) rig.body_from_left = file.Child("cam0").Transform("T_cam_imu", 16).Inverse();
   return rig;
 }
 

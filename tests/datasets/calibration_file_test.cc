@@ -85,6 +85,10 @@ TEST(CalibrationFile, BadFilesGetASentence) {
          "`right.right_from_left` is missing");
   expect(std::string(kPinhole) +
              "right:\n  fx_px: 1\n  fy_px: 1\n  cx_px: 1\n  cy_px: 1\n"
+             "  right_from_left: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n",
+         "must have 12 numbers, [R | t] row by row, not 16");
+  expect(std::string(kPinhole) +
+             "right:\n  fx_px: 1\n  fy_px: 1\n  cx_px: 1\n  cy_px: 1\n"
              "  right_from_left: [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0]\n",
          "rotation");
 }
