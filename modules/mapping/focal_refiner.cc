@@ -93,20 +93,20 @@ bool FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEd
   if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return false;
   const FocalLengths focal = ScaledFocal(WithFocal(given, map.focal()), found->error);
   const double total = FocalError(focal, given);
-  if (std::abs(total) <= kMaxFocalError) return Change(focal, given, keyframes, editor);
-  doubt_ = total;
-  return false;
+  const bool is_plausible = std::abs(total) <= kMaxFocalError;
+  if (!is_plausible) doubt_ = total;
+  if (!is_plausible || !Change(focal, keyframes, editor)) return false;
+  error_ = total;
+  return true;
 }
 
-bool FocalRefiner::Change(const FocalLengths& focal, const CameraCalibration& given,
-                          const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
+bool FocalRefiner::Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
   BundleProblem problem = ProblemOf(editor.map(), keyframes, std::numeric_limits<size_t>::max());
   problem.calibration = WithFocal(problem.calibration, focal);
   const std::optional<BundleResult> adjusted = AdjustBundle(problem, GlobalBundleOptions());
   if (!adjusted) return false;
   before_.reset();
   editor.ChangeFocal(focal);
-  error_ = FocalError(focal, given);
   WriteBack(problem, *adjusted, editor);
   return true;
 }

@@ -29,8 +29,7 @@ class FocalRefiner {
   double doubt() const { return doubt_; }
 
  private:
-  bool Change(const FocalLengths& focal, const CameraCalibration& given, const std::vector<KeyframeId>& keyframes,
-              MapEditor& editor);
+  bool Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor);
 
   size_t max_landmarks_;
   KeyframeId next_look_;
