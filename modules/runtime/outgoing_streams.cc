@@ -11,12 +11,20 @@ constexpr int kMaxResent = 1024;             // messages sent again on one reque
 constexpr size_t kLcmHeaderBytes = 8;
 constexpr double kResentBytesPerSecond = 64e6;  // in all: all that is kept of a stream within a second or so
 
+// A message of several packets of which one is lost leaves the others in its receiver's kernel: for 30 s of the 4 MB
+// that are there for the packets of all messages (net.ipv4.ipfrag_time, ipfrag_high_thresh). Once these are full,
+// nothing of several packets arrives any more. So while more than some get lost, messages have one packet.
+constexpr double kToleratedLossesPerSecond = 2;
+constexpr double kToleratedLossesAtOnce = 20;
+constexpr int64_t kSmallUs = 10'000'000;
+
 }  // namespace
 
 OutgoingStreams::OutgoingStreams(const StageIdentity& identity, const StreamSettings& settings)
     : identity_(identity),
       settings_(settings),
-      resending_(kResentBytesPerSecond, 0.5 * static_cast<double>(settings.receive_buffer_bytes)) {}
+      resending_(kResentBytesPerSecond, 0.5 * static_cast<double>(settings.receive_buffer_bytes)),
+      tolerated_losses_(kToleratedLossesPerSecond, kToleratedLossesAtOnce) {}
 
 int OutgoingStreams::Add(const Channel& channel, std::shared_ptr<Bus> bus, bool is_repaired) {
   const bool is_continued = continued_.contains(channel.name);
@@ -43,9 +51,14 @@ MessageHeader OutgoingStreams::NextHeader(int stream, int64_t wall_us) const {
           .publish_us = wall_us};
 }
 
-size_t OutgoingStreams::MaxMessageBytes(int stream) const {
+size_t OutgoingStreams::MaxMessageBytes(int stream, int64_t now_us) const {
   const Stream& sent = streams_[static_cast<size_t>(stream)];
-  return settings_.MaxMessageBytes(sent.channel.bus) - kLcmHeaderBytes - sent.full_name.size() - 1;
+  const bool is_work = sent.channel.bus == BusKind::kWork || sent.channel.bus == BusKind::kTile;
+  // Others may be continued in a later life, whose messages have to be cut alike.
+  const bool is_small = is_work && now_us < small_until_us_;
+  const size_t datagram_bytes = is_small ? std::min(settings_.max_message_bytes, settings_.max_work_message_bytes)
+                                         : settings_.MaxMessageBytes(sent.channel.bus);
+  return datagram_bytes - kLcmHeaderBytes - sent.full_name.size() - 1;
 }
 
 bool OutgoingStreams::Send(int stream_number, std::vector<Bytes> messages, std::optional<int64_t> source_us) {
@@ -81,6 +94,7 @@ void OutgoingStreams::Resend(const RepairRequest& request, int64_t now_us) {
         if (!resending_.Take(static_cast<double>(message->size()), now_us)) return;
         stream->bus->Publish(stream->full_name, *message, std::nullopt);
         ++num_resent;
+        if (!tolerated_losses_.Take(1, now_us)) small_until_us_ = now_us + kSmallUs;
       }
     }
   }

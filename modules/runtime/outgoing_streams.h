@@ -39,8 +39,8 @@ class OutgoingStreams {
 
   // The header of the next value in the stream.
   MessageHeader NextHeader(int stream, int64_t wall_us) const;
-  // The largest message that may be encoded for it.
-  size_t MaxMessageBytes(int stream) const;
+  // The largest message that may be encoded for it now.
+  size_t MaxMessageBytes(int stream, int64_t now_us) const;
   // Sends the messages of one value. False if the operating system refused one (it will be asked for again).
   bool Send(int stream, std::vector<Bytes> messages, std::optional<int64_t> source_us);
 
@@ -74,6 +74,8 @@ class OutgoingStreams {
   int64_t continued_epoch_us_ = 0;
   bool is_replaying_ = false;
   RateLimit resending_;  // bytes
+  RateLimit tolerated_losses_;
+  int64_t small_until_us_ = 0;  // many got lost
 };
 
 }  // namespace tessera

@@ -87,7 +87,7 @@ void StageEngine::Send(int stream, const Encoder& encode, std::optional<int64_t>
   const MessageHeader header = outgoing_.NextHeader(stream, clock_->WallUs());
   bool is_sent = false;
   try {
-    is_sent = outgoing_.Send(stream, encode(header, outgoing_.MaxMessageBytes(stream)), source_us);
+    is_sent = outgoing_.Send(stream, encode(header, outgoing_.MaxMessageBytes(stream, clock_->NowUs())), source_us);
   } catch (const InputError& error) {
     return Fail(error.what(), 2);  // the log that is written can't be kept
   }

@@ -21,6 +21,7 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   result.channel_prefix = bus.channel_prefix;
   result.receive_buffer_bytes = bus.receive_buffer_bytes;
   result.max_message_bytes = static_cast<size_t>(bus.max_message_bytes);
+  result.max_work_message_bytes = static_cast<size_t>(bus.max_work_message_bytes);
   result.max_local_message_bytes = static_cast<size_t>(bus.max_local_message_bytes);
   result.history_bytes = static_cast<size_t>(stream.history_bytes);
   result.heartbeat_us = 1000LL * stream.heartbeat_ms;
@@ -31,7 +32,8 @@ StreamSettings StreamSettings::From(const Settings& settings) {
   receiver.give_up_silent_us = 10 * receiver.give_up_us;
   receiver.silent_us = std::max<int64_t>(500'000, 3 * result.idle_heartbeat_us);
   receiver.unwatched_us = std::max<int64_t>(300'000, 3 * result.heartbeat_us);
-  receiver.max_asked = MaxAsked(result, std::max(result.max_message_bytes, result.max_local_message_bytes));
+  receiver.max_asked = MaxAsked(
+      result, std::max({result.max_message_bytes, result.max_work_message_bytes, result.max_local_message_bytes}));
   receiver.max_waiting_bytes = result.history_bytes;
   result.journal_dir = stream.journal_dir;
   result.journal_bytes = 1'000'000LL * stream.journal_mb;
@@ -41,8 +43,18 @@ StreamSettings StreamSettings::From(const Settings& settings) {
 }
 
 size_t StreamSettings::MaxMessageBytes(BusKind bus) const {
-  const bool is_local = bus == BusKind::kCamera || bus == BusKind::kColor || bus == BusKind::kMap;
-  return is_local ? max_local_message_bytes : max_message_bytes;
+  switch (bus) {
+    case BusKind::kMain:
+      return max_message_bytes;
+    case BusKind::kWork:
+    case BusKind::kTile:
+      return max_work_message_bytes;
+    case BusKind::kCamera:
+    case BusKind::kColor:
+    case BusKind::kMap:
+      return max_local_message_bytes;
+  }
+  return max_message_bytes;
 }
 
 StreamReceiverOptions StreamSettings::ReceiverOf(BusKind bus) const {

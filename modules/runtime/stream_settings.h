@@ -17,6 +17,7 @@ struct StreamSettings {
   std::string channel_prefix;
   int receive_buffer_bytes = 0;
   size_t max_message_bytes = 0;
+  size_t max_work_message_bytes = 0;   // of the buses of tiles and their features
   size_t max_local_message_bytes = 0;  // of the buses of camera and map
   size_t history_bytes = 0;
   int64_t heartbeat_us = 0;

@@ -46,6 +46,7 @@ struct BusSettings {
   std::string channel_prefix;
   int receive_buffer_bytes = 0;
   int max_message_bytes = 0;
+  int max_work_message_bytes = 0;
   int max_local_message_bytes = 0;
   std::string run_dir;
   bool camera_is_member = true;
@@ -64,6 +65,7 @@ struct BusSettings {
     field("receive_buffer_bytes", self.receive_buffer_bytes, Range{1 << 16, 1 << 30, "bytes"});
     // Above 65,499 bytes LCM would cut messages into fragments, whose loss nobody could repair one by one.
     field("max_message_bytes", self.max_message_bytes, Range{1000, 65000, "bytes"});
+    field("max_work_message_bytes", self.max_work_message_bytes, Range{1000, 65000, "bytes"});
     field("max_local_message_bytes", self.max_local_message_bytes, Range{1000, 65000, "bytes"});
     field("run_dir", self.run_dir);
     field("camera_is_member", self.camera_is_member);

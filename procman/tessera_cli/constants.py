@@ -14,6 +14,9 @@ STACK_BUSES = ("main", "camera", "color", "work", "map")
 FIRST_TILE_PORT_OFFSET = 13
 # A message that fits one packet of a LAN: the loss of one fragment would lose a larger message whole.
 LAN_MESSAGE_BYTES = 1400
+# Of tiles and their features, which are many: six full packets, of 1500 bytes less 20 of IP's header; 8 are UDP's.
+# A message costs a slow node more than a packet does.
+LAN_WORK_MESSAGE_BYTES = 6 * 1480 - 8
 # Bursts of tiles need receive buffers of this size; setup.sh raises the kernel's limit to it.
 RECEIVE_BUFFER_BYTES = 4194304
 # Messages that LCM keeps for a subscriber. Poses come in bursts, and LCM's default of 30 would drop some.

@@ -12,6 +12,7 @@ from tessera_cli.constants import (
     FIRST_TILE_PORT_OFFSET,
     LAN_MESSAGE_BYTES,
     LAN_TILE_GROUP,
+    LAN_WORK_MESSAGE_BYTES,
     STACK_BUSES,
 )
 from tessera_cli.errors import UserError
@@ -30,7 +31,9 @@ def network_assignments(port: int, on_lan: bool) -> list[str]:
     assignments.append(f"bus.first_tile_port={port + FIRST_TILE_PORT_OFFSET}")
     if on_lan:
         tile_url = f"udpm://{LAN_TILE_GROUP}:{{port}}?ttl=1"
-        assignments += [f"bus.tile_url={tile_url}", f"bus.max_message_bytes={LAN_MESSAGE_BYTES}"]
+        assignments.append(f"bus.tile_url={tile_url}")
+        assignments.append(f"bus.max_message_bytes={LAN_MESSAGE_BYTES}")
+        assignments.append(f"bus.max_work_message_bytes={LAN_WORK_MESSAGE_BYTES}")
         assignments.append("dispatcher.pack_tiles=true")
     return assignments
 

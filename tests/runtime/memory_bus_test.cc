@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <random>
 #include <set>
@@ -102,6 +103,41 @@ TEST(MemoryBus, LossesAreRepairedAndCounted) {
   EXPECT_GT(pair.status.num_repaired, 20);
   EXPECT_EQ(pair.status.num_lost, 0);
   EXPECT_EQ(pair.status.num_received, 100);
+}
+
+TEST(MemoryBus, WhileManyMessagesGetLostEachHasOnePacket) {
+  Settings settings = Defaults();
+  settings.Override("bus.max_message_bytes=1400");
+  settings.Override("bus.max_work_message_bytes=8872");
+  MemoryBus bus(std::move(settings));
+  bool loses = false;
+  std::mt19937 generator(4);
+  bus.LoseMessages(
+      [&](const std::string& channel) { return loses && channel == "TILE_FEATURES" && generator() % 5 == 0; });
+  size_t largest = 0;
+  bus.bus().Subscribe(&largest, "TILE_FEATURES", [&](const std::string&, ByteView message, int64_t) {
+    largest = std::max(largest, message.size());
+  });
+  Pair pair(bus, {{.name = "TILE_FEATURES", .bus = BusKind::kWork}});
+  pair.StartListener();
+  pair.StartCamera();
+  size_t num_sent = 0;
+  const auto largest_of = [&](int num_frames) {
+    largest = 0;
+    pair.Send(num_frames);
+    num_sent += static_cast<size_t>(num_frames);
+    EXPECT_TRUE(bus.RunUntil([&] { return pair.received.size() == num_sent; }));
+    return largest;
+  };
+  EXPECT_GT(largest_of(5), 8000u);
+  EXPECT_LE(largest, 8872u);
+  loses = true;
+  largest_of(5);
+  EXPECT_LE(largest_of(5), 1400u);
+  loses = false;
+  EXPECT_LE(largest_of(5), 1400u) << "not at once";
+  bus.RunUntil([] { return false; }, 15.0);
+  EXPECT_GT(largest_of(5), 8000u);
 }
 
 // How many heartbeats of the camera are heard within a second.
@@ -478,23 +514,24 @@ TEST(MemoryBus, SameRunTwiceIsTheSame) {
   EXPECT_EQ(run(), run());
 }
 
-TEST(StreamSettings, ImagesAndTheMapMayHaveLargerMessages) {
+TEST(StreamSettings, ABusMayHaveLargerMessagesThanAnother) {
   Settings given = Defaults();
   given.Override("bus.max_message_bytes=1400");
+  given.Override("bus.max_work_message_bytes=8872");
   given.Override("bus.max_local_message_bytes=50000");
   const StreamSettings settings = StreamSettings::From(given);
-  for (const BusKind bus : {BusKind::kMain, BusKind::kWork, BusKind::kTile}) {
-    EXPECT_EQ(settings.MaxMessageBytes(bus), 1400u);
-  }
+  EXPECT_EQ(settings.MaxMessageBytes(BusKind::kMain), 1400u);
+  for (const BusKind bus : {BusKind::kWork, BusKind::kTile}) EXPECT_EQ(settings.MaxMessageBytes(bus), 8872u);
   for (const BusKind bus : {BusKind::kCamera, BusKind::kColor, BusKind::kMap})
     EXPECT_EQ(settings.MaxMessageBytes(bus), 50000u);
   EXPECT_LT(settings.ReceiverOf(BusKind::kMap).max_asked, settings.ReceiverOf(BusKind::kWork).max_asked);
 }
 
 TEST(StreamSettings, AreChecked) {
-  for (const char* assignment : {"bus.max_message_bytes=100", "bus.max_message_bytes=70000",
-                                 "bus.max_local_message_bytes=70000", "stream.history_bytes=0", "stream.heartbeat_ms=0",
-                                 "stream.repair_ms=0", "bus.first_tile_port=65300", "bus.channel_prefix=a b"}) {
+  for (const char* assignment :
+       {"bus.max_message_bytes=100", "bus.max_message_bytes=70000", "bus.max_work_message_bytes=0",
+        "bus.max_local_message_bytes=70000", "stream.history_bytes=0", "stream.heartbeat_ms=0", "stream.repair_ms=0",
+        "bus.first_tile_port=65300", "bus.channel_prefix=a b"}) {
     Settings settings = Defaults();
     EXPECT_THROW(settings.Override(assignment), InputError) << assignment;
   }

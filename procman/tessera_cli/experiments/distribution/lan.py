@@ -90,8 +90,9 @@ class Lan:
 
     def lose(self, percent: int) -> None:
         """From now on, each host loses so much of what it receives, at random. 0: nothing. Needs nft."""
+        devices = ["lo"] if len(self._rates) == 1 else ["lo", DEVICE]
         for host in self._rates:
-            run_tool(*self.at(host), "nft", loss_rules(percent))
+            run_tool(*self.at(host), "nft", loss_rules(percent, devices))
 
     def traffic(self, host: int) -> Traffic:
         """Since the LAN was made. On a LAN of one host, which has no link: what its processes sent to each other."""
@@ -181,11 +182,14 @@ def _port(host: int) -> str:
     return f"port{host}"
 
 
-def loss_rules(percent: int) -> str:
-    """What nft is to do so that a network loses so much of what arrives, at random; 0: nothing any more."""
-    rule = f"; add rule inet loss input meta l4proto udp numgen random mod 100 < {percent} drop" if percent else ""
-    chain = "add table inet loss; add chain inet loss input { type filter hook input priority 0; }"
-    return f"{chain}; flush chain inet loss input{rule}"
+def loss_rules(percent: int, devices: Sequence[str]) -> str:
+    """What nft is to do so that so much of what arrives by the devices is lost, at random; 0: nothing any more.
+
+    Before fragments of a datagram are put together: each packet is lost by itself, as on a cable.
+    """
+    table, hook = "netdev loss", f"type filter hook ingress devices = {{ {', '.join(devices)} }} priority 0"
+    rule = f"; add rule {table} ingress meta l4proto udp numgen random mod 100 < {percent} drop" if percent else ""
+    return f"add table {table}; add chain {table} ingress {{ {hook}; }}; flush chain {table} ingress{rule}"
 
 
 def ip(*words: object) -> str:

@@ -24,4 +24,4 @@ def enter_own_network() -> None:
 
 def lose(percent: int) -> None:
     """From now on, so much of what arrives is lost, at random. 0: nothing."""
-    run_tool("nft", loss_rules(percent))
+    run_tool("nft", loss_rules(percent, ["lo"]))
