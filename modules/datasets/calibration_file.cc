@@ -1,9 +1,6 @@
 #include "datasets/calibration_file.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include "core/errors.h"
-#include "core/files.h"
 #include "datasets/calibration_section.h"
 #include "datasets/foreign_calibration.h"
 
@@ -69,13 +66,7 @@ CameraRig ReadOwn(const CalibrationSection& section) {
 }  // namespace
 
 CameraRig LoadCalibrationFile(const std::string& path) {
-  YAML::Node document;
-  try {
-    document = YAML::Load(ReadFile(path));
-  } catch (const YAML::Exception& error) {
-    throw InputError("calibration file " + path + " is not valid YAML: " + error.what());
-  }
-  const CalibrationSection file(path, "", document);
+  const CalibrationSection file = CalibrationSection::Load(path);
   const std::optional<CameraRig> foreign = ReadForeignCalibration(file);
   const CameraRig rig = foreign ? *foreign : ReadOwn(file);
   const SensorType sensor = rig.right ? SensorType::kStereo : SensorType::kMono;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/errors.h"
+#include "core/files.h"
 #include "datasets/camera_rig.h"
 #include "datasets/text_file.h"
 
@@ -26,6 +27,14 @@ CalibrationSection::CalibrationSection(std::string path, std::string prefix, con
   if (!node_.IsMap()) {
     throw InputError("calibration file " + path_ +
                      " must hold `key: value` lines; config/cameras/example.yaml shows how");
+  }
+}
+
+CalibrationSection CalibrationSection::Load(const std::string& path) {
+  try {
+    return {path, "", YAML::Load(ReadFile(path))};
+  } catch (const YAML::Exception& error) {
+    throw InputError("calibration file " + path + " is not valid YAML: " + error.what());
   }
 }
 
@@ -51,9 +60,10 @@ double CalibrationSection::Number(const std::string& key) const {
   return number;
 }
 
-int CalibrationSection::Integer(const std::string& key) const {
-  const double number = Number(key);
-  if (number != std::floor(number) || std::abs(number) > 1e6) Complain(key, "must be a whole number");
+int CalibrationSection::Integer(const std::string& key) const { return WholeNumber(key, Number(key)); }
+
+int CalibrationSection::WholeNumber(const std::string& key, double number) const {
+  if (number != std::floor(number) || std::abs(number) > 1e6) Complain(key, "must be whole");
   return static_cast<int>(number);
 }
 
@@ -73,6 +83,12 @@ std::vector<double> CalibrationSection::Numbers(const std::string& key, size_t n
     Complain(key, "must have " + std::to_string(num) + " numbers, not " + std::to_string(numbers.size()));
   }
   return numbers;
+}
+
+std::vector<int> CalibrationSection::Integers(const std::string& key, size_t num) const {
+  std::vector<int> integers;
+  for (const double number : Numbers(key, num)) integers.push_back(WholeNumber(key, number));
+  return integers;
 }
 
 Rigid3 CalibrationSection::Transform(const std::string& key, size_t num) const {

@@ -1,14 +1,12 @@
 // EuRoC MAV sequences: mav0/cam0 and cam1 (sensor.yaml, data.csv, data/), and the pose of the body (IMU) in
 // mav0/state_groundtruth_estimate0/data.csv. T_BS of a sensor.yaml is body_from_sensor. The TUM visual-inertial
 // benchmark has the same folders without sensor.yaml (the calibration is that of Kalibr), and the truth in mocap0.
-#include <yaml-cpp/yaml.h>
-
 #include <filesystem>
 #include <map>
 
 #include "core/errors.h"
-#include "core/files.h"
 #include "datasets/calibration_file.h"
+#include "datasets/foreign_calibration.h"
 #include "datasets/image_file.h"
 #include "datasets/pose_track.h"
 #include "datasets/recording.h"
@@ -19,72 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Sensor {
-  PinholeCamera camera;
-  Rigid3 body_from_sensor;
-};
-
-std::vector<double> Numbers(const YAML::Node& node, const std::string& key, const std::string& path) {
-  try {
-    return node.as<std::vector<double>>();
-  } catch (const YAML::Exception&) {
-    throw InputError("file " + path + ": `" + key + "` is missing or not a list of numbers: repair the file");
-  }
-}
-
-Rigid3 ReadBodyFromSensor(const YAML::Node& document, const std::string& path) {
-  const YAML::Node node = document["T_BS"];
-  const std::vector<double> m = Numbers(node && node.IsMap() ? node["data"] : YAML::Node(), "T_BS", path);
-  if (m.size() != 16) {
-    throw InputError("file " + path + ": `T_BS` must have 16 numbers, not " + std::to_string(m.size()));
-  }
-  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(m.data());
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  if (!IsRotation(rotation)) {
-    throw InputError("file " + path + ": `T_BS` does not begin with a rotation: repair the file");
-  }
-  return Rigid3::FromMatrix(rotation, matrix.topRightCorner<3, 1>());
-}
-
-Sensor ParseSensorFile(const YAML::Node& document, const std::string& path) {
-  const auto model = document["camera_model"].as<std::string>("pinhole");
-  const auto distortion = document["distortion_model"].as<std::string>("radial-tangential");
-  const std::optional<LensModel> lens = ParseLensModel(distortion);
-  if (model != "pinhole" || !lens) {
-    throw InputError("file " + path + ": camera model " + model + " with " + distortion +
-                     " distortion is not supported: only pinhole with radial-tangential or equidistant is");
-  }
-  const std::vector<double> intrinsics = Numbers(document["intrinsics"], "intrinsics", path);
-  const std::vector<double> resolution = Numbers(document["resolution"], "resolution", path);
-  const auto is_size = [](double pixels) { return pixels >= 1.0 && pixels <= 16384.0; };
-  if (intrinsics.size() != 4 || resolution.size() != 2 || !is_size(resolution[0]) || !is_size(resolution[1])) {
-    throw InputError("file " + path +
-                     ": `intrinsics` must have 4 numbers and `resolution` 2 from 1 to 16384: repair the file");
-  }
-  Sensor sensor;
-  sensor.camera.width_px = static_cast<int>(resolution[0]);
-  sensor.camera.height_px = static_cast<int>(resolution[1]);
-  sensor.camera.fx_px = intrinsics[0];
-  sensor.camera.fy_px = intrinsics[1];
-  sensor.camera.cx_px = intrinsics[2];
-  sensor.camera.cy_px = intrinsics[3];
-  sensor.camera.distortion = Numbers(document["distortion_coefficients"], "distortion_coefficients", path);
-  sensor.camera.lens = *lens;
-  ThrowIfFailed<InputError>(sensor.camera.Check(), "file " + path + ": ");
-  sensor.body_from_sensor = ReadBodyFromSensor(document, path);
+CameraOnBody ReadSensor(const fs::path& path) {
+  const CameraOnBody sensor = ReadEurocSensor(CalibrationSection::Load(path));
+  ThrowIfFailed<InputError>(sensor.camera.Check(), "calibration file " + path.string() + ": ");
   return sensor;
-}
-
-Sensor ReadSensor(const fs::path& path) {
-  try {
-    const YAML::Node document = YAML::Load(ReadFile(path));
-    if (!document.IsMap()) {
-      throw InputError("file " + path.string() + " must hold `key: value` lines: copy it again");
-    }
-    return ParseSensorFile(document, path);
-  } catch (const YAML::Exception& error) {
-    throw InputError("file " + path.string() + " can't be understood: " + error.what());
-  }
 }
 
 // Image files of a camera by time, nanoseconds. Throws InputError if one does not exist.
@@ -156,14 +92,14 @@ CameraRig ReadRig(const fs::path& mav, const SourceOptions& options) {
   const bool is_given = !options.calibration_path.empty();
   CameraRig rig = is_given ? LoadCalibrationFile(options.calibration_path) : CameraRig{};
   if (is_given && !fs::exists(left_path)) return rig;
-  const Sensor left = ReadSensor(left_path);
-  rig.body_from_left = left.body_from_sensor;
+  const CameraOnBody left = ReadSensor(left_path);
+  rig.body_from_left = left.body_from_camera;
   if (is_given) return rig;
   rig.left = left.camera;
   if (options.sensor == SensorType::kStereo) {
-    const Sensor right = ReadSensor(mav / "cam1" / "sensor.yaml");
+    const CameraOnBody right = ReadSensor(mav / "cam1" / "sensor.yaml");
     rig.right = right.camera;
-    rig.right_from_left = right.body_from_sensor.Inverse() * left.body_from_sensor;
+    rig.right_from_left = right.body_from_camera.Inverse() * left.body_from_camera;
   }
   return rig;
 }

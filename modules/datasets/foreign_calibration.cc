@@ -10,30 +10,25 @@ LensModel ReadLens(const CalibrationSection& section, const std::string& model) 
   return *lens;
 }
 
-PinholeCamera ReadKalibrCamera(const CalibrationSection& section) {
+// As Kalibr and EuRoC have it. `coefficients`: the key of those of the lens.
+PinholeCamera ReadPinhole(const CalibrationSection& section, const std::string& coefficients) {
   if (section.Text("camera_model") != "pinhole") {
-    section.Complain("camera_model", "must be pinhole (with radtan or equidistant distortion)");
+    section.Complain("camera_model", "must be pinhole (with radial-tangential or equidistant distortion)");
   }
   const std::vector<double> intrinsics = section.Numbers("intrinsics", 4);
-  const std::vector<double> size = section.Numbers("resolution", 2);
-  PinholeCamera camera{static_cast<int>(size[0]),
-                       static_cast<int>(size[1]),
-                       intrinsics[0],
-                       intrinsics[1],
-                       intrinsics[2],
-                       intrinsics[3],
-                       {}};
+  const std::vector<int> size = section.Integers("resolution", 2);
+  PinholeCamera camera{size[0], size[1], intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3], {}};
   if (section.Text("distortion_model") == "none") return camera;
   camera.lens = ReadLens(section, "distortion_model");
-  camera.distortion = section.Numbers("distortion_coeffs", 4);
+  camera.distortion = section.Numbers(coefficients);
   return camera;
 }
 
 CameraRig ReadKalibr(const CalibrationSection& file) {
   CameraRig rig;
-  rig.left = ReadKalibrCamera(file.Child("cam0"));
+  rig.left = ReadPinhole(file.Child("cam0"), "distortion_coeffs");
   if (file.Has("cam1")) {
-    rig.right = ReadKalibrCamera(file.Child("cam1"));
+    rig.right = ReadPinhole(file.Child("cam1"), "distortion_coeffs");
     rig.right_from_left = file.Child("cam1").Transform("T_cn_cnm1", 16);
   }
   if (file.Child("cam0").Has("T_cam_imu")) rig.body_from_left = file.Child("cam0").Transform("T_cam_imu", 16).Inverse();
@@ -61,6 +56,10 @@ std::optional<CameraRig> ReadForeignCalibration(const CalibrationSection& file) 
   if (file.Has("cam0")) return ReadKalibr(file);
   if (file.Has("camera_matrix")) return ReadRos(file);
   return std::nullopt;
+}
+
+CameraOnBody ReadEurocSensor(const CalibrationSection& file) {
+  return {ReadPinhole(file, "distortion_coefficients"), file.Child("T_BS").Transform("data", 16)};
 }
 
 }  // namespace tessera

@@ -167,7 +167,14 @@ TEST_F(EurocTest, BadFilesAreRefused) {
   Replace(sensor, "resolution: [80", "resolution: [.nan");
   ExpectRefused({folder_.path(sensor), "`resolution`"});
   folder_.Write(sensor, good_sensor);
+  Replace(sensor, "resolution: [80", "resolution: [80.5");
+  ExpectRefused({folder_.path(sensor), "`resolution`", "whole"});
+  folder_.Write(sensor, good_sensor);
   Replace(sensor, "data: [", "data: [.nan, ");
+  Replace(sensor, ", 1.0]", "]");
+  ExpectRefused({folder_.path(sensor), "`T_BS.data`"});
+  folder_.Write(sensor, good_sensor);
+  Replace(sensor, "data: [", "data: [7.0, ");
   Replace(sensor, ", 1.0]", "]");
   ExpectRefused({folder_.path(sensor), "rotation"});
   folder_.Write(sensor, good_sensor);
