@@ -15,7 +15,6 @@ from tessera_cli.runs.run_folder import read_frames
 
 # While the pipeline fills and mono finds its first map, poses come at another rate.
 LEFT_OUT_SHARE = 0.1
-TEN_HZ_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -35,10 +34,6 @@ class Figures:
     def host_cpu_ms(self) -> float:
         """Per frame, of all processes but extractors: the estimating host, where extractors are elsewhere."""
         return self.measurement.all_cpu_ms - self.measurement.cpu_ms.get(EXTRACTORS, 0.0)
-
-    @property
-    def host_cores_at_10_hz(self) -> float:
-        return self.host_cpu_ms / 1000 / TEN_HZ_PERIOD_S
 
     @property
     def cores(self) -> float:

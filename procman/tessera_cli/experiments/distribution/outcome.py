@@ -4,13 +4,17 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from scipy.optimize import nnls
+
 from tessera_cli.errors import UserError
 from tessera_cli.experiments.distribution.calibration import Calibration, read_calibration
-from tessera_cli.experiments.distribution.figures import Cell, read_figures
+from tessera_cli.experiments.distribution.figures import Cell, Figures, read_figures
 from tessera_cli.experiments.distribution.grid import EXPERIMENTS, Configuration, Experiment, read_key, tile_count
 from tessera_cli.experiments.plan import DESCRIPTION, RUNS, ExperimentFolder
 
 CALIBRATION = "calibration.json"
+TEN_HZ_PERIOD_MS = 100.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,29 @@ class Outcome:
         """Coarse cuts first, then few extractors first."""
         chosen = [cell for each, cell in self.cells.items() if each.variant in variants]
         return sorted(chosen, key=lambda cell: (cell.configuration.num_tiles, cell.configuration.extractors))
+
+    def host_cores_at_10_hz(self, cell: Cell) -> float:
+        """That the estimating host would use: c - b p of a frame's CPU time c came with the frame, b with its time p.
+
+        b, what processes need while no frame comes, is a fit to all runs of the same cut:  c = a + b p  (a, b >= 0), by
+        least squares. Without it, nodes that are slower than 10 Hz would make the host look busier.
+        """
+        idle_cores = self._idle_host_cores(cell.configuration.tiles)
+
+        def cores(run: Figures) -> float:
+            of_frame_ms = run.host_cpu_ms - idle_cores * run.measurement.period_ms
+            return of_frame_ms / TEN_HZ_PERIOD_MS + idle_cores
+
+        return cell.median(cores)
+
+    def _idle_host_cores(self, tiles: str) -> float:
+        """0 where all runs are faster than 10 Hz, from which it can't be told."""
+        runs = [run for cell in self.of_variant("") if cell.configuration.tiles == tiles for run in cell.runs]
+        periods_ms = np.array([run.measurement.period_ms for run in runs])
+        if len(runs) < 2 or np.max(periods_ms) < TEN_HZ_PERIOD_MS:
+            return 0.0
+        (_, idle_cores), _ = nnls(np.stack([np.ones(len(runs)), periods_ms], axis=1), [run.host_cpu_ms for run in runs])
+        return float(idle_cores)
 
     @property
     def hashes(self) -> set[tuple[str, str]]:

@@ -50,7 +50,12 @@ def make_grids(outcome: Outcome) -> list[Grid]:
             _latency,
             ALONE,
         ),
-        _grid(outcome, "CPU [ms per frame]", f"Of {host}; in brackets: cores at 10 Hz.", _cpu),
+        _grid(
+            outcome,
+            "CPU [ms per frame]",
+            f"Of {host}; in brackets: cores at 10 Hz, what passes between frames is counted once.",
+            _cpu,
+        ),
         _grid(outcome, "Traffic [kB per frame]", f"Bytes {wire}; in brackets: times whole images.", _wire),
         _grid(outcome, "Messages repaired – lost", "Largest of the repetitions.", _messages),
         _grid(outcome, "What limits it", "Share of the time in which the busiest process works.", _limit),
@@ -91,9 +96,8 @@ def _latency(_outcome: Outcome, cell: Cell) -> str:
     return f"{np.median(times):.0f}/{np.percentile(times, 95):.0f}"
 
 
-def _cpu(_outcome: Outcome, cell: Cell) -> str:
-    cores = cell.median(lambda run: run.host_cores_at_10_hz)
-    return f"{cell.median(lambda run: run.host_cpu_ms):.1f} ({cores:.2f})"
+def _cpu(outcome: Outcome, cell: Cell) -> str:
+    return f"{cell.median(lambda run: run.host_cpu_ms):.1f} ({outcome.host_cores_at_10_hz(cell):.2f})"
 
 
 def _wire(outcome: Outcome, cell: Cell) -> str:

@@ -2,6 +2,7 @@
 
 from helpers.made_distribution import make_figures, make_outcome
 from tessera_cli.experiments.distribution.claims import Claim, check_claims
+from tessera_cli.experiments.distribution.figures import Figures
 from tessera_cli.experiments.distribution.grid import ALONE, HETEROGENEOUS, KILLED, SINGLE, Configuration
 
 
@@ -45,6 +46,20 @@ def test_the_estimating_host_is_all_but_extractors() -> None:
     outcome = make_outcome(SINGLE, {Configuration(1, "1x1"): [make_figures()]})
     claim = find(check_claims(outcome), "10 Hz")
     assert claim.is_met and claim.measured == "0.20 to 0.20"  # 4 + 16 ms ten times a second
+
+
+def test_what_passes_between_frames_that_come_slowly_is_not_counted_ten_times() -> None:
+    """A frame costs 30 ms, and each second 50 ms, whether frames come or not."""
+
+    def of_rate(frames_per_s: float) -> list[Figures]:
+        return [
+            make_figures(frames_per_s=frames_per_s, cpu_ms={"extractors": 8.0, "mapper": 30.0 + 50.0 / frames_per_s})
+        ]
+
+    outcome = make_outcome(
+        HETEROGENEOUS, {Configuration(1, "2x2"): of_rate(1.0), Configuration(8, "2x2"): of_rate(8.0)}
+    )
+    assert find(check_claims(outcome), "10 Hz").measured == "0.35 to 0.35"
 
 
 def test_a_run_with_another_result_is_told() -> None:
