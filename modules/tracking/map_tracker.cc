@@ -29,10 +29,6 @@ constexpr double kMinDoubtfulShift_px = 10.0;
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
 
-// The variance of a way in mono by that which residuals show, as simulated worlds have it (stages/tracker/
-// MEASUREMENTS.md, "Covariance").
-constexpr double kUnseenInMono = 1.2;
-
 // `are_shared`: other frames may see the same points.
 PoseInfluences ByPoint(PoseInfluences influences, bool are_shared) {
   for (PointInfluence& influence : influences) {
@@ -494,15 +490,13 @@ bool MapTracker::IsDoubtful(const TrackedFrame& frame, const Rigid3& reference_f
   return frame.view->calibration().fx_px * difference > kMinDoubtfulShift_px * frame.MedianDepth();
 }
 
-// Both ends of the way are as uncertain as their own frames' points leave them. Landmarks of mono move together with the
-// few keyframes that made them, which no residual shows.
+// Both ends of the way are as uncertain as their own frames' points leave them.
 std::optional<Matrix6d> MapTracker::CovarianceFromReference(const TrackedFrame& frame,
                                                             const std::optional<PoseInfluences>& influences) {
   if (!influences) return std::nullopt;
   if (!reference_influences_) reference_influences_ = ByPoint(*influences, false);
-  const Matrix6d covariance = WayCovariance(*reference_influences_, *influences,
-                                            frame.world_from_camera.Inverse() * WorldFromReference().Pose());
-  return frame.view->baseline_m() > 0.0 ? covariance : kUnseenInMono * covariance;
+  return WayCovariance(*reference_influences_, *influences,
+                       frame.world_from_camera.Inverse() * WorldFromReference().Pose());
 }
 
 void MapTracker::LearnReadout(const TrackedFrame& frame) {
