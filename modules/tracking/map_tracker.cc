@@ -91,7 +91,9 @@ MapTracker::MapTracker(const MapTrackerOptions& options)
 Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
   // Keyframes of a map that was loaded have numbers too.
   if (delta.is_snapshot) next_keyframe_.value = std::max(next_keyframe_.value, delta.answers.value + 1);
-  return replica_.Apply(delta);
+  Result<> applied = replica_.Apply(delta);
+  way_corrections_.Update(replica_);
+  return applied;
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
@@ -177,8 +179,9 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
 // The camera as a body of its own.
 BodyState MapTracker::DescribeBody() const {
   BodyState body{.world_from_base = last_->frame.world_from_camera};
-  if (last_->pose_covariance) {
-    body.covariance = *last_->pose_covariance;
+  const std::optional<double> variance_factor = way_corrections_.variance_factor();
+  if (last_->pose_covariance && variance_factor) {
+    body.covariance = *variance_factor * *last_->pose_covariance;
     body.has_covariance = true;
   }
   if (motion_.is_known()) {
@@ -617,6 +620,11 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   AddPairPoints(frame, keyframe, sent);
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(keyframe.id, std::move(sent));
+  if (!reference.valid()) {
+    way_corrections_.BeginPart(frame.view->baseline_m() == 0.0);
+  } else if (last_ && &last_->frame == &frame && last_->pose_covariance) {
+    way_corrections_.Send(reference, keyframe.id, reference_from_camera, *last_->pose_covariance);
+  }
   reference_ = keyframe.id;
   reference_influences_ = InfluencesOnReference(frame, reference);
   if (frame.view->baseline_m() == 0.0) reference_frame_ = frame;

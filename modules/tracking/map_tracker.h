@@ -26,6 +26,7 @@
 #include "tracking/pose_covariance.h"
 #include "tracking/readout_estimator.h"
 #include "tracking/scale_watch.h"
+#include "tracking/way_corrections.h"
 
 namespace tessera {
 
@@ -170,6 +171,7 @@ class MapTracker {
   KeyframeId reference_;
   // By point: its own, or those of the first frame tracked from it.
   std::optional<PoseInfluences> reference_influences_;
+  WayCorrections way_corrections_;
   std::optional<TrackedFrame>
       reference_frame_;            // mono: as it was when it became a keyframe; nullopt: it is the map's alone
   Rigid3 world_from_start_;        // camera where the next part of the map begins
