@@ -45,7 +45,7 @@ StreamSettings StreamSettings::From(const Settings& settings) {
 size_t StreamSettings::MaxMessageBytes(BusKind bus) const {
   switch (bus) {
     case BusKind::kMain:
-      return max_message_bytes;
+      break;
     case BusKind::kWork:
     case BusKind::kTile:
       return max_work_message_bytes;

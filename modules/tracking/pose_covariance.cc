@@ -125,4 +125,15 @@ Matrix6d WayCovariance(const PoseInfluences& reference, const PoseInfluences& fr
   return SumOfSquares(by_cell) + adjoint * SumOfSquares(rest) * adjoint.transpose();
 }
 
+double ErrorByCovariance(const Vector6d& d, const Matrix6d& covariance,
+                         const std::optional<Eigen::Vector3d>& free_direction) {
+  const Eigen::LDLT<Matrix6d> factor(covariance);
+  const double all = d.dot(factor.solve(d));
+  if (!free_direction) return all / kDegreesOfFreedom;
+  Vector6d free = Vector6d::Zero();
+  free.head<3>() = *free_direction;
+  const Vector6d weighted = factor.solve(free);
+  return (all - d.dot(weighted) * d.dot(weighted) / free.dot(weighted)) / (kDegreesOfFreedom - 1);
+}
+
 }  // namespace tessera

@@ -44,4 +44,8 @@ Matrix6d PoseCovariance(const PoseInfluences& influences);
 Matrix6d WayCovariance(const PoseInfluences& reference, const PoseInfluences& frame,
                        const Rigid3& frame_from_reference);
 
+// d' covariance^-1 d by degrees of freedom: 6; or 5, at its least, where d is free along a translation.
+double ErrorByCovariance(const Eigen::Matrix<double, 6, 1>& d, const Matrix6d& covariance,
+                         const std::optional<Eigen::Vector3d>& free_direction);
+
 }  // namespace tessera

@@ -1,12 +1,11 @@
 #include "tracking/way_corrections.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
+
+#include "tracking/pose_covariance.h"
 
 namespace tessera {
 namespace {
-
-using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr size_t kMaxWays = 6;
 constexpr int kMinAnsweredWays = 3;  // of a map of mono
@@ -36,16 +35,13 @@ void WayCorrections::Update(const MapReplica& replica) {
   if (std::ranges::count_if(ways_, is_answered) >= kMinAnsweredWays) is_young_ = false;
 }
 
+// In the keyframe's axes, as the covariance is.
 double WayCorrections::ExcessOf(const Way& way, const Rigid3& corrected) const {
   const Rigid3 difference = way.sent.Inverse() * corrected;
-  Vector6d d, along = Vector6d::Zero();
+  Eigen::Matrix<double, 6, 1> d;
   d << difference.translation, LogSO3(difference.rotation);
-  along.head<3>() = way.sent.rotation.conjugate() * way.sent.translation;
-  const Eigen::LDLT<Matrix6d> factor(way.covariance);
-  const double all = d.dot(factor.solve(d));
-  if (!is_mono_) return all / 6.0;
-  const Vector6d weighted = factor.solve(along);
-  return (all - d.dot(weighted) * d.dot(weighted) / along.dot(weighted)) / 5.0;
+  const Eigen::Vector3d along = way.sent.rotation.conjugate() * way.sent.translation;
+  return ErrorByCovariance(d, way.covariance, is_mono_ ? std::optional(along) : std::nullopt);
 }
 
 std::optional<double> WayCorrections::variance_factor() const {

@@ -177,17 +177,6 @@ namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-// e' C^-1 e; with a direction along which e is free, at its least.
-double Nees(const Vector6d& e, const Matrix6d& covariance, const std::optional<Eigen::Vector3d>& free_direction) {
-  const Eigen::LDLT<Matrix6d> factor(covariance);
-  const double all = e.dot(factor.solve(e));
-  if (!free_direction) return all;
-  Vector6d free = Vector6d::Zero();
-  free.head<3>() = *free_direction;
-  const Vector6d weighted = factor.solve(free);
-  return all - e.dot(weighted) * e.dot(weighted) / free.dot(weighted);
-}
-
 // The camera's velocity in its own axes: the mean of those over the steps before and after.
 std::optional<Eigen::Vector3d> TrueVelocity(const std::map<FrameId, GroundTruthPose>& truth, FrameId frame) {
   const auto before = truth.find({frame.value - 1}), at = truth.find(frame), after = truth.find({frame.value + 1});
@@ -231,11 +220,11 @@ std::optional<Consistency> MeasureConsistency(const OfflineRun& run, const std::
     e << difference.translation, LogSO3(difference.rotation);
     unit.head<3>() *= scale;
     const Eigen::Vector3d way = estimate.rotation.inverse() * estimate.translation;
-    const double nees = Nees(e, unit.asDiagonal() * pose.body.covariance * unit.asDiagonal(),
-                             with_scale ? std::optional(way) : std::nullopt);
+    const double nees_per_dof = ErrorByCovariance(e, unit.asDiagonal() * pose.body.covariance * unit.asDiagonal(),
+                                                  with_scale ? std::optional<Eigen::Vector3d>(way) : std::nullopt);
     ++sum.num_poses;
-    sum.nees_per_dof += nees / num_dof;
-    sum.share_within += nees < (with_scale ? 11.070 : 12.592) ? 1.0 : 0.0;  // 95 % of chi-square
+    sum.nees_per_dof += nees_per_dof;
+    sum.share_within += num_dof * nees_per_dof < (with_scale ? 11.070 : 12.592) ? 1.0 : 0.0;  // 95 % of chi-square
     const std::optional<Eigen::Vector3d> velocity = TrueVelocity(truth_of, pose.frame);
     if (!velocity || !pose.body.has_motion) continue;
     sum.velocity_rms += (scale * pose.body.motion.velocity - *velocity).squaredNorm();

@@ -13,8 +13,6 @@ namespace {
 constexpr double kSigma = 0.01;
 const Rigid3 kStep{ExpSO3({0.0, 0.1, 0.0}), {0.0, 0.0, 1.0}};
 
-Matrix6d CovarianceOf(double sigma) { return sigma * sigma * Matrix6d::Identity(); }
-
 // A chain of keyframes, each sent a step from the one before.
 class Chain {
  public:
@@ -26,9 +24,9 @@ class Chain {
   void Send() {
     const KeyframeId reference{num_sent_++}, keyframe{num_sent_};
     replica_.Send(keyframe, {reference, kStep, {}});
-    corrections_.Send(reference, keyframe, kStep, CovarianceOf(kSigma));
+    corrections_.Send(reference, keyframe, kStep, kSigma * kSigma * Matrix6d::Identity());
   }
-  // The mapper answers the next one that it was not asked about yet: the way to it is another one.
+  // The mapper answers the next keyframe: this is the way to it.
   void Answer(const Rigid3& way) {
     MapEditor editor(map_);
     if (num_answered_ == 0) editor.AddKeyframe({0}, {}, {}, PlainFeatures(0, 3));
