@@ -1,10 +1,12 @@
 // The owner's answers to followers that lack something: its last deltas once more, or a snapshot page by page.
 //
 // Snapshots are older than the map, and the deltas since are kept: a follower that was killed and restarted may have to
-// repeat its steps on the map as it was then.
+// repeat its steps on the map as it was then. So the archive follows the owner's map with some delay, delta by delta,
+// and lists the map as it was only for those who ask: a list of a large map at each interval would make the tracker
+// wait.
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -22,21 +24,31 @@ class MapArchive {
   };
 
   // The owner began with this map.
-  void Begin(const Map& map);
-  // A delta was sent; `map` is the owner's after it. `awaited`: number of a delta that somebody is still to answer, and
-  // must find again when started anew; nullopt: none.
-  void Add(std::shared_ptr<const MapDelta> delta, const Map& map, std::optional<int64_t> awaited);
-  // What to send to one who asks; `map` is the owner's, after the last delta added. Nothing if the asker lacks nothing,
-  // or if there is no map yet.
-  Answer AnswerTo(const MapRequest& request, const Map& map);
+  void Begin(const Map& map) { old_map_ = map; }
+  // A delta was sent. `awaited`: number of a delta that somebody is still to answer, and must find again when started
+  // anew; nullopt: none.
+  void Add(std::shared_ptr<const MapDelta> delta, std::optional<int64_t> awaited);
+  // What to send to one who asks. Nothing if the asker lacks nothing, or if there is no map yet.
+  Answer AnswerTo(const MapRequest& request);
 
-  // A snapshot is taken of the first delta, and then this often, in deltas. The one handed out is of the beginning, or
-  // between one and two such intervals old, or else the last before the awaited delta.
-  static constexpr int64_t kSnapshotInterval = 48;
+  // The map that is handed out has at least the first delta, or is the one that the owner began with. Else it is this
+  // old to twice as old, in deltas, or older than the awaited delta.
+  static constexpr int64_t kDelay = 48;
 
  private:
-  std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest snapshot, or all
-  std::deque<MapDelta> snapshots_;                      // by age; features are shared with the map
+  // Pages are asked for one after the other, all of the same snapshot.
+  struct Snapshot {
+    MapDelta whole;
+    int64_t asked = 0;  // the newest delta when a page was last asked for
+  };
+
+  int64_t newest() const { return deltas_.empty() ? old_map_.next_delta() - 1 : deltas_.back()->number; }
+  void FollowOwner(std::optional<int64_t> awaited);
+  MapSnapshotPage FirstPage();
+
+  Map old_map_;
+  std::deque<std::shared_ptr<const MapDelta>> deltas_;  // all since the oldest map that is handed out
+  std::deque<Snapshot> snapshots_;                      // by age; features are shared with the map
 };
 
 }  // namespace tessera

@@ -8,9 +8,8 @@ namespace tessera {
 
 Result<> MapperSessionOptions::Check() const {
   // A loop closer that is started again finds the keyframe in the last snapshot but one.
-  if (delays.loop_keyframes < 1 || delays.loop_keyframes >= MapArchive::kSnapshotInterval) {
-    return Failed("a loop must be applied 1 to " + std::to_string(MapArchive::kSnapshotInterval - 1) +
-                  " keyframes later");
+  if (delays.loop_keyframes < 1 || delays.loop_keyframes >= MapArchive::kDelay) {
+    return Failed("a loop must be applied 1 to " + std::to_string(MapArchive::kDelay - 1) + " keyframes later");
   }
   if (delays.adjustment_keyframes < 1 || delays.adjustment_growth < 1) {
     return Failed("a global adjustment must be applied at least one keyframe later");
@@ -72,7 +71,7 @@ MapperActions MapperSession::Receive(const GlobalAdjustment& adjustment) {
 }
 
 MapperActions MapperSession::Receive(const MapRequest& request) {
-  MapArchive::Answer answer = archive_.AnswerTo(request, map());
+  MapArchive::Answer answer = archive_.AnswerTo(request);
   MapperActions actions;
   for (auto& delta : answer.deltas) actions.emplace_back(std::move(delta));
   for (auto& page : answer.pages) actions.emplace_back(std::move(page));
@@ -121,7 +120,7 @@ MapperActions MapperSession::End() {
 MapperActions MapperSession::Publish(MapDelta delta) {
   if (delta.asks_adjustment) schedule_.Ask(delta.answers, delta.number);
   auto shared = std::make_shared<const MapDelta>(std::move(delta));
-  archive_.Add(shared, map(), schedule_.asked_delta());
+  archive_.Add(shared, schedule_.asked_delta());
   MapperActions actions;
   actions.emplace_back(shared);
   actions.emplace_back(places_.Update(*shared, map()));

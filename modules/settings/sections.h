@@ -219,7 +219,7 @@ struct MapperSettings {
     field("max_outer_keyframes", self.max_outer_keyframes, Range{1, 1000, "keyframes"});
     field("close_loops", self.close_loops);
     // A loop closer that is started again finds the keyframe in the last snapshot but one.
-    field("loop_delay_keyframes", self.loop_delay_keyframes, Range{1, MapArchive::kSnapshotInterval - 1, "keyframes"});
+    field("loop_delay_keyframes", self.loop_delay_keyframes, Range{1, MapArchive::kDelay - 1, "keyframes"});
     field("adjustment_delay_keyframes", self.adjustment_delay_keyframes, Range{1, 100'000, "keyframes"});
     field("polish", self.polish);
     field("refine_focal", self.refine_focal);

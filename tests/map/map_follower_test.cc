@@ -28,10 +28,10 @@ class Owner {
 
   MapFollower::Delta Next(std::optional<int64_t> awaited = std::nullopt) {
     auto delta = std::make_shared<const MapDelta>(RandomChange(map_, generator_));
-    archive_.Add(delta, map_, awaited);
+    archive_.Add(delta, awaited);
     return delta;
   }
-  MapArchive::Answer AnswerTo(const MapRequest& request) { return archive_.AnswerTo(request, map_); }
+  MapArchive::Answer AnswerTo(const MapRequest& request) { return archive_.AnswerTo(request); }
   void Answer(const MapRequest& request, MapFollower& follower) {
     const MapArchive::Answer answer = AnswerTo(request);
     num_pages_ += static_cast<int>(answer.pages.size());
@@ -313,7 +313,7 @@ TEST(MapFollower, PagesForOthersAreNoBusinessOfOnesOwn) {
 
 TEST(MapArchive, SeveralFollowersMayReadDifferentSnapshots) {
   Owner owner(7);
-  for (int i = 0; i < 130; ++i) owner.Next();  // a new snapshot comes at 144
+  for (int i = 0; i < 130; ++i) owner.Next();  // they begin with different ones
   std::vector<MapFollower> followers(4, MapFollower(true));
   std::vector<Map> replicas(4);
   for (int round = 0; round < 2000; ++round) {
@@ -341,8 +341,8 @@ void ExpectOldBaseWithAllDeltasSince(Owner& owner, int64_t num_since_begin) {
   ASSERT_THAT(pages, testing::SizeIs(1));
   const int64_t next = owner.map().next_delta();
   const int64_t age = next - 1 - pages[0].part.number;
-  EXPECT_GE(age, std::min(num_since_begin, MapArchive::kSnapshotInterval)) << next;
-  EXPECT_LE(age, 2 * MapArchive::kSnapshotInterval) << next;
+  EXPECT_GE(age, std::min(num_since_begin, MapArchive::kDelay)) << next;
+  EXPECT_LE(age, 2 * MapArchive::kDelay) << next;
   for (int64_t number = pages[0].part.number + 1; number < next;) {
     const MapArchive::Answer answer = owner.AnswerTo({.next_delta = number});
     ASSERT_THAT(answer.pages, testing::IsEmpty()) << "delta " << number << " of " << next << " is gone";
@@ -366,10 +366,26 @@ TEST(MapArchive, TheBaseSnapshotIsOlderThanWhatIsAwaited) {
   const std::vector<MapSnapshotPage> pages = owner.AnswerTo({}).pages;
   ASSERT_THAT(pages, testing::SizeIs(1));
   EXPECT_LT(pages[0].part.number, 60);
-  EXPECT_GE(pages[0].part.number, 60 - 2 * MapArchive::kSnapshotInterval);
+  EXPECT_GE(pages[0].part.number, 60 - 2 * MapArchive::kDelay);
   EXPECT_THAT(owner.AnswerTo({.next_delta = 60}).pages, testing::IsEmpty()) << "the awaited delta itself is gone";
-  for (int64_t i = 0; i < MapArchive::kSnapshotInterval; ++i) owner.Next();
+  for (int64_t i = 0; i < MapArchive::kDelay; ++i) owner.Next();
   ExpectOldBaseWithAllDeltasSince(owner, 300);
+}
+
+TEST(MapArchive, ASnapshotStaysAsLongAsItIsRead) {
+  Owner owner(13);
+  for (int64_t i = 0; i < 200; ++i) owner.Next();
+  const MapSnapshotPage first = owner.AnswerTo({}).pages.at(0);
+  ASSERT_GT(first.num_pages, 20);
+  for (int32_t page = 1; page < first.num_pages; ++page) {  // a slow reader
+    for (int64_t i = 0; i < MapArchive::kDelay / 4; ++i) owner.Next();
+    EXPECT_EQ(owner.AnswerTo({.snapshot = first.part.number, .page = page}).pages.at(0).page, page);
+  }
+  EXPECT_THAT(owner.AnswerTo({.next_delta = first.part.number + 1}).pages, testing::IsEmpty());
+  for (int64_t i = 0; i < 2 * MapArchive::kDelay; ++i) owner.Next();
+  const MapSnapshotPage renewed = owner.AnswerTo({.snapshot = first.part.number, .page = 1}).pages.at(0);
+  EXPECT_EQ(renewed.page, 0) << "nobody reads it any more";
+  EXPECT_GT(renewed.part.number, first.part.number);
 }
 
 TEST(MapArchive, BeginsWithALoadedMap) {

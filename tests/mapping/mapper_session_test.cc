@@ -182,7 +182,7 @@ TEST(MapperSession, WhoLacksSomethingIsAnsweredAtOnce) {
 
 TEST(MapperSession, DelaysMustBePossible) {
   EXPECT_THROW(MapperSession({.delays = {.loop_keyframes = 0}}), std::invalid_argument);
-  EXPECT_THROW(MapperSession({.delays = {.loop_keyframes = MapArchive::kSnapshotInterval}}), std::invalid_argument);
+  EXPECT_THROW(MapperSession({.delays = {.loop_keyframes = MapArchive::kDelay}}), std::invalid_argument);
   EXPECT_THROW(MapperSession({.delays = {.adjustment_growth = 0}}), std::invalid_argument);
 }
 
