@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -67,37 +68,44 @@ Vocabulary::Vocabulary(VocabularyTree tree) : tree_(std::move(tree)) {
   }
 }
 
+// The least of distance * 256 + child: no branch, which would be a guess at each child.
 size_t Vocabulary::NearestChild(size_t node, const Descriptor& descriptor) const {
+  static_assert(VocabularyTree::kMaxChildren < 256);
   const auto first = static_cast<size_t>(first_child_[node]);
-  size_t nearest = first;
-  int least_distance = 257;
-  for (size_t child = first; child < first + tree_.num_children[node]; ++child) {
-    const int distance = HammingDistance(descriptor, tree_.centers[child]);
-    if (distance < least_distance) {
-      least_distance = distance;
-      nearest = child;
-    }
+  const Descriptor* centers = tree_.centers.data() + first;
+  uint32_t nearest = std::numeric_limits<uint32_t>::max();
+  for (uint32_t child = 0; child < tree_.num_children[node]; ++child) {
+    nearest = std::min(nearest, static_cast<uint32_t>(HammingDistance(descriptor, centers[child])) << 8 | child);
   }
-  return nearest;
+  return first + (nearest & 0xff);
 }
 
-Vocabulary::Leaf Vocabulary::FindLeaf(const Descriptor& descriptor) const {
-  size_t node = 0;
-  size_t direct_node = 0;
-  for (int32_t level = 1; tree_.num_children[node] > 0; ++level) {
-    node = NearestChild(node, descriptor);
-    if (level <= tree_.direct_level) direct_node = node;
+// All descriptors go down together, level by level: so the memory that one of them waits for keeps no other from its
+// step.
+std::vector<Vocabulary::Leaf> Vocabulary::FindLeaves(const std::vector<Descriptor>& descriptors) const {
+  std::vector<size_t> nodes(descriptors.size(), 0);
+  std::vector<Leaf> leaves(descriptors.size(), Leaf{0, 0});
+  bool goes_on = true;
+  for (int32_t level = 1; goes_on; ++level) {
+    goes_on = false;
+    for (size_t i = 0; i < descriptors.size(); ++i) {
+      if (tree_.num_children[nodes[i]] == 0) continue;
+      nodes[i] = NearestChild(nodes[i], descriptors[i]);
+      if (level <= tree_.direct_level) leaves[i].direct_node = static_cast<int32_t>(nodes[i]);
+      goes_on = true;
+    }
   }
-  return {first_child_[node], static_cast<int32_t>(direct_node)};
+  for (size_t i = 0; i < descriptors.size(); ++i) leaves[i].word = first_child_[nodes[i]];
+  return leaves;
 }
 
 BagOfWords Vocabulary::Describe(const std::vector<Descriptor>& descriptors) const {
+  const std::vector<Leaf> leaves = FindLeaves(descriptors);
   std::vector<int32_t> words(descriptors.size());
   std::vector<std::pair<int32_t, int32_t>> placed(descriptors.size());  // (node, keypoint)
   for (size_t i = 0; i < descriptors.size(); ++i) {
-    const Leaf leaf = FindLeaf(descriptors[i]);
-    words[i] = leaf.word;
-    placed[i] = {leaf.direct_node, static_cast<int32_t>(i)};
+    words[i] = leaves[i].word;
+    placed[i] = {leaves[i].direct_node, static_cast<int32_t>(i)};
   }
   BagOfWords bag;
   bag.words = WeighWords(CountWords(std::move(words)), tree_.idf);

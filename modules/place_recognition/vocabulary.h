@@ -57,7 +57,7 @@ class Vocabulary {
     int32_t direct_node;  // the node on the way that is in the direct index's level, or the leaf itself if above it
   };
   size_t NearestChild(size_t node, const Descriptor& descriptor) const;
-  Leaf FindLeaf(const Descriptor& descriptor) const;
+  std::vector<Leaf> FindLeaves(const std::vector<Descriptor>& descriptors) const;
 
   VocabularyTree tree_;
   std::vector<int32_t> first_child_;  // by node; of a word: its number
