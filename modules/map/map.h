@@ -188,6 +188,7 @@ class Map {
   Result<> RemoveObservation(const MapDelta::ChangedObservation& change);
   void AddClosedLoop(const ClosedLoop& loop);
   Result<> Observe(const MapDelta::ChangedObservation& change);  // counts nothing
+  Result<> ObserveAll(const std::vector<MapDelta::ChangedObservation>& all);
   void CountShared(const MapDelta::ChangedObservation& change, int num);
   void CountAllShared();
 
