@@ -34,19 +34,26 @@ MapSubscription::MapSubscription(StageContext& context, bool joins_late, Apply a
   });
 }
 
+// nullopt: the mapper begins without a map, or this node can't read its file: the mapper tells of it.
+std::optional<MapDelta> MapSubscription::ReadLoadedMap() const {
+  const std::string path = context_.settings().Get<MapperSettings>().load_map;
+  if (path.empty()) return std::nullopt;
+  try {
+    return ReadMapFile(path);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+void MapSubscription::ReadAhead() { read_ahead_ = ReadLoadedMap(); }
+
 // A map of hundreds of megabytes comes sooner from the file that the mapper began with, where this node has it, than by
-// the bus. Another map's file has another hash, and one that can't be read is done without: the mapper tells of it.
+// the bus. Another map's file has another hash.
 void MapSubscription::TakeRestFromFile() {
   const MapDelta* begun = follower_.BegunSnapshot();
   if (begun == nullptr) return;
-  const std::string path = context_.settings().Get<MapperSettings>().load_map;
-  if (path.empty()) return;
-  try {
-    MapDelta whole = ReadMapFile(path);
-    if (whole.number == begun->number && whole.hash == begun->hash) follower_.ReceiveRest(std::move(whole));
-  } catch (const InputError&) {
-    return;
-  }
+  std::optional<MapDelta> whole = read_ahead_ ? std::exchange(read_ahead_, std::nullopt) : ReadLoadedMap();
+  if (whole && whole->number == begun->number && whole->hash == begun->hash) follower_.ReceiveRest(std::move(*whole));
 }
 
 void MapSubscription::FollowToEnd() {

@@ -23,6 +23,9 @@ class MapSubscription {
   MapSubscription(const MapSubscription&) = delete;
   MapSubscription& operator=(const MapSubscription&) = delete;
 
+  // The first pose waits for this stage: the file of the map that the mapper begins with is read at once, instead of
+  // when the mapper has loaded it, too.
+  void ReadAhead();
   // The mapper's end is of interest: the last deltas are asked for if they do not come.
   void FollowToEnd();
   // The same for a stage that listens to END_OF_STREAM itself. Ends of other stages change nothing.
@@ -37,6 +40,7 @@ class MapSubscription {
   bool needs_snapshot() const { return follower_.needs_snapshot(); }
 
  private:
+  std::optional<MapDelta> ReadLoadedMap() const;
   void TakeRestFromFile();
   void ApplyAll();
   void Ask();
@@ -45,6 +49,7 @@ class MapSubscription {
   Apply apply_;
   std::function<void()> on_news_;
   MapFollower follower_;
+  std::optional<MapDelta> read_ahead_;
   Publisher<MapRequest> requests_;
   std::optional<EndOfStream> mapper_end_;
   int64_t num_rejected_ = 0;

@@ -49,6 +49,7 @@ LoopCloserStage::LoopCloserStage(StageContext& context)
     session_.Receive(request);
     Advance();
   });
+  map_.ReadAhead();
   map_.FollowToEnd();
 }
 

@@ -61,6 +61,7 @@ TrackerStage::TrackerStage(StageContext& context)
     throw std::runtime_error(
         "it can't continue where it was killed: its journal had been given up before, or its disk is broken");
   }
+  map_.ReadAhead();
   poses_ = context.Advertise(kPose);
   keyframes_ = context.Advertise(kKeyframe);
   end_of_stream_ = context.Advertise(kEndOfStream);
