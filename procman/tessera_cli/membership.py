@@ -91,6 +91,20 @@ class RunDir:
                 f"the run's folder {self.path} can't be used: {error.strerror}; TESSERA_KEYS may name another place."
             ) from error
 
+    def is_locked(self) -> bool:
+        """Whether another process has it, also one in another network namespace."""
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY)
+        except OSError:
+            return False  # nobody made it yet; one that can't be used is told of by lock
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(descriptor)
+        return False
+
     def unlock(self) -> None:
         if self._lock is not None:
             os.close(self._lock)

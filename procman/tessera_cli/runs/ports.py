@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator
 
+from tessera_cli.cluster.keys import key_folder
 from tessera_cli.constants import DEFAULT_PORT, FREE_BUS_S, HEARTBEAT
 from tessera_cli.errors import RunError
 from tessera_cli.lcm_bus import Bus, bus_url, listen
+from tessera_cli.membership import run_dir_of
 from tessera_cli.runs.locks import RunLock
 
 # From one stack's ports to the next: its buses, and a port for each extractor that there may be.
@@ -22,8 +24,13 @@ class PortLock(RunLock):
 
 
 def take_free_port(channel_prefix: str) -> tuple[int, PortLock]:
-    """The first base port whose bus nobody uses with this prefix, locked. Raises RunError if there is none."""
+    """The first base port whose bus nobody uses with this prefix, locked. Raises RunError if there is none.
+
+    A run in another network namespace, such as an experiment's, has another bus, but the same folder by its port.
+    """
     for port in _candidates():
+        if run_dir_of(key_folder(), bus_url(port), channel_prefix).is_locked():
+            continue
         try:
             lock = PortLock(port, channel_prefix)
         except OSError:
