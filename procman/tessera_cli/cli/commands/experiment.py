@@ -44,6 +44,7 @@ examples:
   sudo procman/tessera experiment {name}
   sudo procman/tessera experiment {name} kitti:DIR --frames 0:300 --out logs/{name}
   sudo procman/tessera experiment {name} stereo=sim:street --extractors 1 4 --tiles 1x1 2x2 --repetitions 1 --no-faults
+  sudo procman/tessera experiment {name} --set dispatcher.pack_tiles=false    # then: experiment compare A B
 """
 FAULTS = """\
 One run is left alone; in all others faults are thrown, one after the other, as the seed shuffles them: a process gets
@@ -174,6 +175,7 @@ def _add_distribution(experiments: Commands, name: str, summary: str) -> None:
         )
     parser.add_argument("--no-faults", action="store_true", help="leave out the killed node and the lost packets")
     add_frames(parser, ", for a quick check")
+    add_settings(parser)
     _add_data(parser)
     _add_out(parser, name)
     add_port(parser)

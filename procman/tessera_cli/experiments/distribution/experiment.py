@@ -103,6 +103,7 @@ def _describe(arguments: Namespace, experiment: Experiment, sequence: Sequence, 
         "this": checkout.fingerprint(),
         "frames": list(arguments.frames),
         **({"step_ms": arguments.step_ms} if experiment.is_slow else {}),
+        **({"settings": arguments.settings} if arguments.settings else {}),
     }
 
 
@@ -150,7 +151,7 @@ class _Series:
             self._view.say(f"{len(lan.hosts)} hosts in network namespaces; deputies are starting")
             port = self._arguments.port
             nodes = stack.enter_context(Nodes(self._folder.path / "nodes", lan, checkout, port, groups))
-            stack_runner = StackRunner(self._experiment, lan, nodes, commands, port)
+            stack_runner = StackRunner(self._experiment, lan, nodes, commands, port, self._arguments.settings)
             if groups:
                 calibration = self._calibrate(stack_runner, groups)
                 self._view.say(check_room(calibration, most, len(os.sched_getaffinity(0))))
@@ -202,6 +203,8 @@ def _present(folder: ExperimentFolder, runs: list[PlannedRun]) -> int:
     outcome = read_outcome(folder.path)
     claims = check_claims(outcome)
     remarks = [*_room(outcome), *disturbances(folder, runs)]
+    if outcome.settings:
+        remarks.insert(0, f"All runs had these settings: {', '.join(outcome.settings)}.")
     name = outcome.experiment.name
     page = folder.path / f"{name}.html"
     write_text(folder.path / f"{name}.json", json.dumps(as_json(outcome, claims, remarks), indent=2) + "\n")
@@ -256,6 +259,9 @@ def compare_distributions(arguments: Namespace) -> int:
 def _differences(outcomes: list[Outcome]) -> list[str]:
     first, second = outcomes
     found = []
+    if first.settings != second.settings:
+        one, two = (", ".join(each.settings) or "none" for each in outcomes)
+        found.append(f"The settings that --set changed differ: {one} and {two}.")
     if first.sequence != second.sequence or first.num_frames != second.num_frames:
         found.append(
             f"The sequences differ: {first.sequence}, {first.num_frames} frames, and {second.sequence}, "

@@ -1,7 +1,7 @@
 """A distribution experiment as its folder holds it."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ class Outcome:
     sequence: str
     cells: dict[Configuration, Cell]
     calibration: Calibration | None  # of slow nodes
+    settings: list[str] = field(default_factory=list)  # section.key=value, of all runs
 
     @property
     def extractors(self) -> list[int]:
@@ -97,7 +98,8 @@ def read_outcome(path: Path) -> Outcome:
     if not cells:
         raise UserError(f"{path} holds no run that came to its end.")
     title = f"{sequence['name']} {sequence['sensor']}"
-    return Outcome(path.name, path, experiment, title, cells, read_calibration(path / CALIBRATION))
+    settings = description.get("settings", [])
+    return Outcome(path.name, path, experiment, title, cells, read_calibration(path / CALIBRATION), settings)
 
 
 def folder_of(outcome: Outcome, configuration: Configuration) -> Path:

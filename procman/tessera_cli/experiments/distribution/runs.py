@@ -36,9 +36,18 @@ class Job:
 class StackRunner:
     """Runs the stack on a LAN whose deputies run."""
 
-    def __init__(self, experiment: Experiment, lan: Lan, nodes: Nodes, commands: CommandRunner, port: int) -> None:
+    def __init__(
+        self,
+        experiment: Experiment,
+        lan: Lan,
+        nodes: Nodes,
+        commands: CommandRunner,
+        port: int,
+        settings: list[str],
+    ) -> None:
+        """`settings`: section.key=value, for all runs; what a configuration says comes before them."""
         self._experiment, self._lan, self._nodes, self._commands = experiment, lan, nodes, commands
-        self._port = port
+        self._port, self._settings = port, settings
 
     def run(self, job: Job, look: Callable[[str], None]) -> float:
         """CPU seconds of all that was started. The run's folder gets TRAFFIC too. Raises RunError if it fails."""
@@ -71,6 +80,7 @@ class StackRunner:
     def _assignments(self, job: Job) -> list[str]:
         configuration, (first, last) = job.configuration, job.frames
         return [
+            *self._settings,
             f"camera.source={job.source}",
             f"camera.sensor={job.sequence.sensor}",
             f"camera.first_frame={first}",

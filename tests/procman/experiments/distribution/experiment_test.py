@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from helpers.stack import Finished, Tessera, read_line, wait_for
+from helpers.stack import NUM_FRAMES, Finished, Tessera, read_line, wait_for
+from helpers.synthetic_sequence import HEIGHT_PX, WIDTH_PX
 from tessera_cli.errors import UserError
 from tessera_cli.experiments.distribution.lan import SPACES, require_root
 from tessera_cli.files import BIN
@@ -33,6 +34,7 @@ def test_two_hosts_make_what_one_makes(
     tessera: Tessera, sequence: Path, reference_run: Finished, tmp_path: Path
 ) -> None:
     options = ("--extractors", 2, "--tiles", "2x2", "--repetitions", 1, "--no-faults", "--port", tessera.next_port())
+    options += ("--set", "dispatcher.pack_tiles=false")
     finished = tessera.command(
         "experiment", "homogeneous", f"kitti:{sequence}", *options, "--out", tmp_path / "out"
     ).must_end_well()
@@ -41,7 +43,8 @@ def test_two_hosts_make_what_one_makes(
     assert {run["variant"] for run in results["runs"]} == {"", "alone"}
     for run in results["runs"]:
         assert run["trajectory_sha256"] == reference_run.summary["trajectory_sha256"]
-        assert run["link_bytes"]["node2"]["received"] > 60 * 100_000, "the images of 60 frames went to the second host"
+        assert run["link_bytes"]["node2"]["received"] > NUM_FRAMES * WIDTH_PX * HEIGHT_PX, "images as they are"
+    assert "All runs had these settings: dispatcher.pack_tiles=false." in finished.out
     assert (tmp_path / "out" / "homogeneous.html").is_file() and (tmp_path / "out" / "homogeneous.csv").is_file()
 
 

@@ -17,6 +17,7 @@ from tessera_cli.experiments.distribution.grid import HETEROGENEOUS, HOMOGENEOUS
 from tessera_cli.experiments.distribution.outcome import read_outcome
 from tessera_cli.experiments.distribution.page import write_distribution_page, write_pictures
 from tessera_cli.experiments.distribution.tables import as_csv, as_json, as_markdown, make_grids, print_outcome
+from tessera_cli.experiments.plan import DESCRIPTION
 
 
 @pytest.fixture(scope="module")
@@ -102,9 +103,12 @@ def test_two_experiments_lie_beside_each_other(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     other = write_experiment(tmp_path / "fast", HOMOGENEOUS)
+    description = json.loads((other / DESCRIPTION).read_text())
+    (other / DESCRIPTION).write_text(json.dumps({**description, "settings": ["dispatcher.pack_tiles=false"]}))
     arguments = Namespace(first=str(folder), second=str(other), out=str(tmp_path / "new" / "both.html"))
     assert compare_distributions(arguments) == 0
-    assert "bit for bit" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "bit for bit" in out and "differ: none and dispatcher.pack_tiles=false." in out
     words = " ".join(Page(tmp_path / "new" / "both.html").root.words().split())
     assert "slow and fast, beside each other" in words
     with pytest.raises(UserError, match="the same experiment"):
