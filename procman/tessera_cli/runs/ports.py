@@ -29,13 +29,12 @@ def take_free_port(channel_prefix: str) -> tuple[int, PortLock]:
     A run in another network namespace, such as an experiment's, has another bus, but the same folder by its port.
     """
     for port in _candidates():
-        if run_dir_of(key_folder(), bus_url(port), channel_prefix).is_locked():
-            continue
         try:
             lock = PortLock(port, channel_prefix)
         except OSError:
             continue
-        if _is_silent(port, channel_prefix):
+        is_used_elsewhere = run_dir_of(key_folder(), bus_url(port), channel_prefix).is_locked()
+        if not is_used_elsewhere and _is_silent(port, channel_prefix):
             return port, lock
     raise RunError(
         f"the base ports {DEFAULT_PORT} to {DEFAULT_PORT + STEP * (NUM_TRIED - 1)} are in use: give --port N."
