@@ -36,7 +36,7 @@ void MapArchive::FollowOwner(std::optional<int64_t> awaited) {
 
 MapSnapshotPage MapArchive::FirstPage() {
   const bool is_recent = !snapshots_.empty() && (snapshots_.back().whole.number == old_map_.next_delta() - 1 ||
-                                                  newest() - snapshots_.back().whole.number <= 2 * kDelay);
+                                                 newest() - snapshots_.back().whole.number <= 2 * kDelay);
   if (!is_recent) snapshots_.push_back({old_map_.Snapshot(), 0});
   snapshots_.back().asked = newest();
   return CutSnapshotPage(snapshots_.back().whole, 0);
