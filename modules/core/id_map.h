@@ -52,6 +52,8 @@ class IdMap {
     if (--page->num_values == 0) page.reset();
   }
   int64_t size() const { return static_cast<int64_t>(chunks_.size() * kChunk - free_.size()); }
+  // Ids below were given out, also such as were never put here.
+  void RaiseEnd(int64_t end_id) { end_id_ = std::max(end_id_, end_id); }
   // One more than the highest id that was ever put.
   int64_t end_id() const { return end_id_; }
 

@@ -136,6 +136,9 @@ class Map {
   // Fails where the delta does not fit this map, which is unusable afterwards (ask for a snapshot).
   Result<> Apply(const MapDelta& delta);
 
+  // The owner has given out landmark ids below this one, also such as no delta tells.
+  void RaiseEnd(LandmarkId end) { landmarks_.RaiseEnd(end.value); }
+
   // Number that the next delta must have.
   int64_t next_delta() const { return next_delta_; }
   // The keyframe that the last delta answered; invalid: there was none.

@@ -82,6 +82,12 @@ void RemovedKeyframes::Add(const KeyframeLink& link) {
   }
 }
 
+std::optional<KeyframeLink> RemovedKeyframes::LinkOf(KeyframeId id) const {
+  const auto link = links_.find(id);
+  if (link == links_.end()) return std::nullopt;
+  return KeyframeLink{id, link->second.parent, link->second.parent_from_keyframe};
+}
+
 std::optional<Sim3> RemovedKeyframes::Find(const Map& map, KeyframeId id) const {
   return FollowLinks(links_, id, [&](KeyframeId ancestor) -> std::optional<Sim3> {
     const Keyframe* keyframe = map.FindKeyframe(ancestor);

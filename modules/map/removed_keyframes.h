@@ -38,6 +38,8 @@ class RemovedKeyframes {
   // ignored.
   void Add(const KeyframeLink& link);
 
+  // Of one that is no longer in the map; nullopt: it has none.
+  std::optional<KeyframeLink> LinkOf(KeyframeId id) const;
   // Keyframe::WorldFromKeyframe of one that is in the map or has been there; nullopt of one that never was.
   std::optional<Sim3> Find(const Map& map, KeyframeId id) const;
   // The keyframe of the map that `id` is linked to: itself if it is there. Invalid if it never was.

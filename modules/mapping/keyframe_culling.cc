@@ -101,6 +101,11 @@ void KeyframeCuller::Cull(KeyframeId center, RemovedKeyframes& removed, MapEdito
   }
 }
 
+void KeyframeCuller::Follow(KeyframeId center, const Map& map) {
+  visits_.Update(map, center);
+  levels_.clear();
+}
+
 bool KeyframeCuller::IsRedundant(const Map& map, KeyframeId id) {
   const int visit = visits_.Of(id);
   // It is an observer of its landmarks itself.

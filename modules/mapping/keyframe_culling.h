@@ -71,6 +71,8 @@ class KeyframeCuller {
   // that closed a loop. Since the last call, observations may have changed only by edits of `editor`; between the
   // calls, landmarks may have been removed as well.
   void Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
+  // The same where Cull's changes are in the map already, with whatever else the step changed.
+  void Follow(KeyframeId center, const Map& map);
 
  private:
   bool IsRedundant(const Map& map, KeyframeId id);

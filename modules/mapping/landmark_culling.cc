@@ -36,6 +36,12 @@ void RecentLandmarks::Cull(KeyframeId now, const LandmarkCullingOptions& options
   });
 }
 
+void RecentLandmarks::ForgetOld(KeyframeId now, const LandmarkCullingOptions& options, const Map& map) {
+  std::erase_if(entries_, [&](const Entry& entry) {
+    return map.FindLandmark(entry.landmark) == nullptr || now.value - entry.created_at.value >= options.recent_keyframes;
+  });
+}
+
 void RemoveUnconfirmed(KeyframeId center, const std::vector<LandmarkId>& created, const LandmarkCullingOptions& options,
                        MapEditor& editor) {
   const Map& map = editor.map();

@@ -26,6 +26,8 @@ class RecentLandmarks {
   // Removes those from the map that have too few observations by the time of keyframe `now`; those that are old enough
   // are trusted from now on.
   void Cull(KeyframeId now, const LandmarkCullingOptions& options, MapEditor& editor);
+  // The same where Cull's changes are in the map already.
+  void ForgetOld(KeyframeId now, const LandmarkCullingOptions& options, const Map& map);
 
  private:
   struct Entry {

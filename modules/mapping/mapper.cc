@@ -70,7 +70,8 @@ Mapper::Mapper(const MapperOptions& options) : options_(options), keyframe_culle
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
-  if (options_.refines_focal) RefineFocal(seen, editor);
+  const bool has_new_focal = options_.refines_focal && RefineFocal(seen, editor);
+  is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_focal;
   Insert(seen, editor);
   RememberMotion(seen);
   ObserveLandmarks(seen, editor);
@@ -87,6 +88,42 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   for (const KeyframeId id : delta.removed_keyframes) motions_.erase(id);
   delta.asks_adjustment = AskForAdjustment(seen.id);
   return delta;
+}
+
+MapperStep Mapper::LastStep(const MapDelta& delta) const {
+  MapperStep step{.is_repeatable = is_repeatable_, .delta = {}, .removed = {}, .first_recent = {}, .end_landmark = {}};
+  step.delta.number = delta.number;
+  step.delta.answers = delta.answers;
+  if (!is_repeatable_) return step;
+  step.delta = delta;
+  for (const KeyframeId id : delta.removed_keyframes) step.removed.push_back(*removed_.LinkOf(id));
+  step.first_recent = first_recent_;
+  step.end_landmark = {map_.landmarks().end_id()};
+  return step;
+}
+
+// In the order of Process: what looks at the map before the step, the step, and what looks at it then.
+Result<> Mapper::Repeat(const KeyframeObservation& seen, const MapperStep& step) {
+  const MapDelta& delta = step.delta;
+  if (delta.answers != seen.id) return Failed("it is a step of keyframe " + std::to_string(delta.answers.value));
+  if (options_.refines_focal) {
+    MapEditor editor(map_);
+    RefineFocal(seen, editor);
+  }
+  TESSERA_RETURN_IF_FAILED(map_.Apply(delta));
+  map_.RaiseEnd(step.end_landmark);
+  RememberMotion(seen);
+  recent_landmarks_.ForgetOld(seen.id, options_.landmark_culling, map_);
+  std::vector<LandmarkId> recent;
+  for (LandmarkId id = step.first_recent; id < step.end_landmark; ++id.value) {
+    if (map_.FindLandmark(id) != nullptr) recent.push_back(id);
+  }
+  recent_landmarks_.Add(seen.id, recent);
+  for (const KeyframeLink& link : step.removed) removed_.Add(link);
+  keyframe_culler_.Follow(seen.id, map_);
+  for (const KeyframeId id : delta.removed_keyframes) motions_.erase(id);
+  AskForAdjustment(seen.id);
+  return {};
 }
 
 std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
@@ -139,11 +176,12 @@ bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId n
 }
 
 // Poses move: what loops and an adjustment under way are measured against is gone.
-void Mapper::RefineFocal(const KeyframeObservation& seen, MapEditor& editor) {
-  if (!focal_refiner_.Refine(seen.id, seen.features.calibration, editor)) return;
+bool Mapper::RefineFocal(const KeyframeObservation& seen, MapEditor& editor) {
+  if (!focal_refiner_.Refine(seen.id, seen.features.calibration, editor)) return false;
   last_corrected_ = seen.id;
   is_base_outdated_ = base_.has_value();
   wants_adjustment_ |= is_base_outdated_;
+  return true;
 }
 
 bool Mapper::AskForAdjustment(KeyframeId now) {
@@ -224,6 +262,7 @@ void Mapper::ObserveShared(const KeyframeObservation& seen, MapEditor& editor) {
 std::vector<LandmarkId> Mapper::CreateLandmarks(KeyframeId id, MapEditor& editor) {
   CreationOptions creation = options_.creation;
   creation.matching.needs_far_end = IsCautious(id);
+  first_recent_ = {map_.landmarks().end_id()};
   std::vector<LandmarkId> from_pairs = CreateFromPairs(id, creation, editor);
   recent_landmarks_.Add(id, from_pairs);
   recent_landmarks_.Add(id, CreateFromDepth(id, options_.creation, editor));

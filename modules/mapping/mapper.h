@@ -15,6 +15,7 @@
 #include "mapping/landmark_culling.h"
 #include "mapping/landmark_fusion.h"
 #include "mapping/map_correction.h"
+#include "messages/mapper_step.h"
 #include "messages/tracking_types.h"
 #include "optimization/bundle_adjustment.h"
 #include "optimization/local_adjustment.h"
@@ -59,6 +60,11 @@ class Mapper {
   // function of all input so far; it asks for a global adjustment after a loop was closed, unless one is under way.
   // Throws std::invalid_argument if the id is not new or the lists do not fit the keypoints.
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
+  // The last step of Process, for Repeat.
+  MapperStep LastStep(const MapDelta& delta) const;
+  // Takes a step that Process took in an earlier life, on the same input: a hundredth of the work, and the same from
+  // then on. `step`, which must be repeatable, is what LastStep said then. Fails, and can't go on, if it does not fit.
+  Result<> Repeat(const KeyframeObservation& seen, const MapperStep& step);
   // Applies the corrections that are due when no further keyframe will come, and asks for a last global adjustment
   // after loops, or anyway to polish the map. nullopt if nothing changes: then the map is final.
   std::optional<MapDelta> Finish(const DueCorrections& due);
@@ -74,7 +80,7 @@ class Mapper {
   bool ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor);
   bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
-  void RefineFocal(const KeyframeObservation& seen, MapEditor& editor);
+  bool RefineFocal(const KeyframeObservation& seen, MapEditor& editor);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void RememberMotion(const KeyframeObservation& seen);
@@ -93,6 +99,8 @@ class Mapper {
   RemovedKeyframes removed_;
   KeyframeCuller keyframe_culler_;
   FocalRefiner focal_refiner_;
+  bool is_repeatable_ = false;          // the last step: no corrections, which have states of their own
+  LandmarkId first_recent_;             // of the last step
   KeyframeId last_corrected_;           // the delta that answers it corrected the map
   bool wants_adjustment_ = false;       // a loop was closed after the last adjustment was requested
   std::optional<AdjustmentBase> base_;  // of the adjustment under way

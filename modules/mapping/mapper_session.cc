@@ -83,10 +83,10 @@ MapperActions MapperSession::Receive(const EndOfStream& tracker_end) {
   return {};
 }
 
-MapperActions MapperSession::Advance() {
+MapperActions MapperSession::Advance(const std::optional<MapperStep>& taken) {
   switch (state()) {
     case State::kReady:
-      return Process();
+      return Process(taken);
     case State::kEnding:
       return End();
     default:
@@ -94,12 +94,22 @@ MapperActions MapperSession::Advance() {
   }
 }
 
-MapperActions MapperSession::Process() {
-  const KeyframeObservation& keyframe = waiting_.front();
-  MapperActions actions =
-      Publish(mapper_.Process(keyframe, options_.closes_loops ? schedule_.Take(keyframe.id) : DueCorrections{}));
+MapperActions MapperSession::Process(const std::optional<MapperStep>& taken) {
+  const KeyframeObservation keyframe = std::move(waiting_.front());
   waiting_.pop_front();
   ++num_processed_;
+  const DueCorrections due = options_.closes_loops ? schedule_.Take(keyframe.id) : DueCorrections{};
+  if (taken && taken->is_repeatable) {
+    if (const Result<> repeated = mapper_.Repeat(keyframe, *taken); !repeated) {
+      has_failed_ = true;
+      return {Fail{.sentence = "its journal does not fit its input: " + repeated.error().sentence}};
+    }
+    return Publish(taken->delta);
+  }
+  MapDelta delta = mapper_.Process(keyframe, due);
+  MapperActions actions;
+  actions.emplace_back(mapper_.LastStep(delta));
+  for (MapperAction& action : Publish(std::move(delta))) actions.push_back(std::move(action));
   return actions;
 }
 

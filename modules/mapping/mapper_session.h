@@ -38,9 +38,9 @@ struct MapperSessionOptions {
   Result<> Check() const;
 };
 
-// Values are to be published.
+// Values are to be published, but for a MapperStep: that is for the journal.
 using MapperAction =
-    std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, Fail, Finish>;
+    std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, MapperStep, Fail, Finish>;
 using MapperActions = std::vector<MapperAction>;
 
 class MapperSession {
@@ -62,8 +62,9 @@ class MapperSession {
   // The tracker has sent `tracker_end.num_values` keyframes.
   MapperActions Receive(const EndOfStream& tracker_end);
 
-  // Takes one step if the state is kReady or kEnding, else does nothing.
-  MapperActions Advance();
+  // Takes one step if the state is kReady or kEnding, else does nothing. `taken`: what an earlier life said of this
+  // step; nullopt: nothing is known of it.
+  MapperActions Advance(const std::optional<MapperStep>& taken = std::nullopt);
 
   State state() const;
   size_t num_waiting() const { return waiting_.size(); }  // keyframes
@@ -75,7 +76,7 @@ class MapperSession {
   KeyframeId last_loop() const { return options_.closes_loops ? KeyframeId{next_keyframe_.value - 1} : KeyframeId{}; }
   // Whether corrections may still change the map when the last keyframe is in it.
   bool has_corrections() const { return (options_.closes_loops || options_.mapper.polishes) && num_processed_ > 0; }
-  MapperActions Process();
+  MapperActions Process(const std::optional<MapperStep>& taken);
   MapperActions End();
   MapperActions Publish(MapDelta delta);
 

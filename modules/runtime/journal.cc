@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <string_view>
 #include <utility>
+#include <utility>
 
 #include "core/crc32.h"
 #include "core/errors.h"
@@ -130,6 +131,8 @@ void Journal::Begin(int64_t epoch_us) {
 
 // nullopt at the end, or where an entry is not whole.
 std::optional<Journal::Entry> Journal::Read() {
+  if (is_at_end_) return std::nullopt;
+  is_at_end_ = true;  // until an entry is whole
   Head head;
   if (std::fread(&head, sizeof(head), 1, reader_.get()) != 1) return std::nullopt;
   if (head.num_bytes > size_ - std::ftell(reader_.get())) return std::nullopt;
@@ -139,6 +142,7 @@ std::optional<Journal::Entry> Journal::Read() {
     return std::nullopt;
   }
   std::optional<Entry> entry = Decode(content);
+  is_at_end_ = !entry;
   if (entry) num_bytes_ += static_cast<int64_t>(sizeof(head) + content.size());
   return entry;
 }
@@ -149,11 +153,18 @@ double Journal::replayed_share() const {
 
 std::optional<Journal::Entry> Journal::Next() {
   if (!reader_) return std::nullopt;
-  std::optional<Entry> entry = Read();
+  std::optional<Entry> entry = ahead_ ? std::exchange(ahead_, std::nullopt) : Read();
   if (entry) return entry;
   reader_.reset();
   if (ftruncate(file_, num_bytes_) != 0) ThrowUnusable(path_);
   return std::nullopt;
+}
+
+std::optional<Journal::Entry> Journal::NextOf(const std::string& channel) {
+  if (!reader_) return std::nullopt;
+  if (!ahead_) ahead_ = Read();
+  if (!ahead_ || ahead_->channel != channel) return std::nullopt;
+  return std::exchange(ahead_, std::nullopt);
 }
 
 Result<> Journal::Append(const std::string& channel, ByteView message, int64_t arrival_us) {

@@ -1,4 +1,4 @@
-// What a stage received, in a file: the memory that outlives its process. A stage that is killed and started again is
+// What a stage received, and what it wants to remember of long steps, in a file: the memory that outlives its process. A stage that is killed and started again is
 // given all of it once more, in the same order. As what it says is a pure function of that, it comes to the state that
 // it had, and makes the same messages with the same numbers in the same streams: nobody else notices more than a pause.
 //
@@ -45,6 +45,8 @@ class Journal {
   double replayed_share() const;
   // The next of them; nullopt: that was the last one.
   std::optional<Entry> Next();
+  // The next of them if it has this name.
+  std::optional<Entry> NextOf(const std::string& channel);
 
   // Behind the last one. Fails once, if it is given up for this.
   Result<> Append(const std::string& channel, ByteView message, int64_t arrival_us);
@@ -62,6 +64,8 @@ class Journal {
   int64_t epoch_us_ = 0;
   bool is_lost_ = false;
   std::unique_ptr<std::FILE, CloseFile> reader_;
+  bool is_at_end_ = false;         // of what is whole in it
+  std::optional<Entry> ahead_;     // was read, and not given yet
   int64_t size_ = 0;       // of the file when it was opened for reading
   int64_t num_bytes_ = 0;  // of whole entries, as far as they are read or written
   int file_ = -1;          // that is written

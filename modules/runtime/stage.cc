@@ -21,6 +21,10 @@ StageContext& StageContext::KeepJournal(const std::vector<Channel>& inputs, cons
 bool StageContext::has_lost_journal() const { return engine_.has_lost_journal(); }
 bool StageContext::was_restarted() const { return engine_.has_lost_journal() || engine_.is_replaying(); }
 
+bool StageContext::remembers() const { return engine_.remembers(); }
+void StageContext::Remember(const std::string& name, ByteView message) { engine_.Remember(name, message); }
+std::optional<Bytes> StageContext::Remembered(const std::string& name) { return engine_.Remembered(name); }
+
 int StageContext::AddStream(const Channel& channel) { return engine_.Advertise(channel); }
 
 void StageContext::Send(int stream, const Encoder& encode, std::optional<int64_t> source_us) {

@@ -78,6 +78,23 @@ class StageContext {
   // This process was started again, as one that keeps a journal can tell.
   bool was_restarted() const;
 
+  // What a long step came to, told right after it to whoever has a journal: a later life that gets the same input finds
+  // it there, and need not take the step again. nullopt: nothing is known of this step, which has to be taken.
+  template <class Value>
+  void Remember(const Value& value) {
+    if (remembers()) Remember(TypeName<Value>(), EncodeValue(value, {.publisher = name(), .epoch_us = epoch_us()}, kWhole).front());
+  }
+  template <class Value>
+  std::optional<Value> Remembered() {
+    const std::optional<Bytes> message = Remembered(TypeName<Value>());
+    const auto header = message ? ReadHeader(*message) : std::nullopt;
+    if (!header) return std::nullopt;
+    ValueJoiner<Value> joiner;
+    const Result<Value*> value = joiner.Add(*message, *header);
+    if (!value || *value == nullptr) return std::nullopt;
+    return std::move(**value);
+  }
+
   // Values handed to the publisher are numbered, kept for repair, cut into typed parts if large, and sent.
   // Throws std::runtime_error if the channel may have one publisher only and another process is it.
   template <class Value>
@@ -140,6 +157,11 @@ class StageContext {
   // Encodes a value into messages of at most `max_bytes` each.
   using Encoder = std::function<std::vector<Bytes>(const MessageHeader& first, size_t max_bytes)>;
 
+  static constexpr size_t kWhole = size_t{1} << 30;  // of one message
+
+  bool remembers() const;
+  void Remember(const std::string& name, ByteView message);
+  std::optional<Bytes> Remembered(const std::string& name);
   int AddStream(const Channel& channel);
   void Send(int stream, const Encoder& encode, std::optional<int64_t> source_us);
   void ForgetSent(int stream);

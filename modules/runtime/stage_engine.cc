@@ -161,6 +161,19 @@ void StageEngine::KeepJournal(const std::vector<Channel>& inputs, const std::vec
   if (journal_->is_replaying()) outgoing_.BeginReplay(names_of(outputs), journal_->epoch_us());
 }
 
+void StageEngine::Remember(const std::string& name, ByteView message) {
+  if (const Result<> written = journal_->Append(name, message, clock_->NowUs()); !written) {
+    ReportError(written.error().sentence);
+  }
+}
+
+std::optional<Bytes> StageEngine::Remembered(const std::string& name) {
+  if (!is_replaying()) return std::nullopt;
+  std::optional<Journal::Entry> entry = journal_->NextOf(name);
+  if (!entry) return std::nullopt;
+  return std::move(entry->message);
+}
+
 // One at a time, so that heartbeats are sent between long steps.
 void StageEngine::ReplayOne() {
   if (!is_replaying()) return;

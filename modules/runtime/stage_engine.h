@@ -52,6 +52,10 @@ class StageEngine {
   void Subscribe(const Channel& channel, const char* type, MakeReceiver make_receiver, Listener listener);
   void SubscribeAll(IncomingStreams::RawHandler handler);
   void KeepJournal(const std::vector<Channel>& inputs, const std::vector<Channel>& outputs);
+  // Whether Remember has somewhere to put it. A life that repeats another has nothing new to remember.
+  bool remembers() const { return journal_ && !journal_->is_lost() && !journal_->is_replaying(); }
+  void Remember(const std::string& name, ByteView message);
+  std::optional<Bytes> Remembered(const std::string& name);
   bool has_lost_journal() const { return journal_ && journal_->is_lost(); }
   bool is_replaying() const { return journal_ && journal_->is_replaying(); }
   StageContext& Join(const std::string& channel_prefix);

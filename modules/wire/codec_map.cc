@@ -1,10 +1,12 @@
 // MAP_DELTA, MAP_SNAPSHOT, MAP_REQUEST, REMOVED_KEYFRAMES; and what a map file begins with.
 #include "map/map_exchange.h"
 #include "map/removed_keyframes.h"
+#include "messages/mapper_step.h"
 #include "tessera/map_delta_t.hpp"
 #include "tessera/map_file_t.hpp"
 #include "tessera/map_request_t.hpp"
 #include "tessera/map_snapshot_t.hpp"
+#include "tessera/mapper_step_t.hpp"
 #include "tessera/removed_keyframes_t.hpp"
 #include "wire/codec_impl.h"
 #include "wire/keypoints_layout.h"
@@ -181,5 +183,23 @@ struct Layout<removed_keyframes_t> {
   }
 };
 TESSERA_CODEC(RemovedInDelta, removed_keyframes_t);
+
+template <>
+struct Layout<mapper_step_t> {
+  template <class Fields, class Message, class Value>
+  static void Describe(Fields& fields, Message& message, Value& step) {
+    fields(message.is_repeatable, step.is_repeatable);
+    fields.Key(message.number, step.delta.number);
+    fields(message.answers, step.delta.answers);
+    fields.Bits(message.hash, step.delta.hash);
+    fields(message.asks_adjustment, step.delta.asks_adjustment);
+    fields.Check(step.delta.number >= 0, "its number is negative");
+    fields(message.change, step.delta);
+    fields.List(message.num_ties, message.ties, step.removed);
+    fields(message.first_recent, step.first_recent);
+    fields(message.end_landmark, step.end_landmark);
+  }
+};
+TESSERA_CODEC(MapperStep, mapper_step_t);
 
 }  // namespace tessera

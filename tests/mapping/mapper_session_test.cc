@@ -1,8 +1,12 @@
 #include "mapping/mapper_session.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <deque>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/synthetic_world.h"
@@ -42,13 +46,21 @@ class Stack {
   template <class Value>
   State Receive(const Value& value) {
     Note(session.Receive(value));
-    while (session.state() == State::kReady || session.state() == State::kEnding) Note(session.Advance());
+    while (session.state() == State::kReady || session.state() == State::kEnding) {
+      std::optional<MapperStep> step;
+      if (!taken.empty() && session.state() == State::kReady) {
+        step = std::move(taken.front());
+        taken.pop_front();
+      }
+      Note(session.Advance(step));
+    }
     return session.state();
   }
   void Note(const MapperActions& actions) {
     for (const MapperAction& action : actions) {
       std::visit(Overloaded{[&](const std::shared_ptr<const MapDelta>& delta) { deltas.push_back(delta->number); },
                             [&](const RemovedInDelta& delta) { removed.push_back(delta.delta); },
+                            [&](const MapperStep& step) { steps.push_back(step); },
                             [&](const MapSnapshotPage& page) { pages.push_back(page.page); },
                             [&](const EndOfStream& end) { ends.push_back(end); },
                             [&](const Fail& fail) { failures.push_back(fail.sentence); },
@@ -60,6 +72,8 @@ class Stack {
   SyntheticWorld world{SensorType::kStereo, 0.3};
   MapperSession session;
   std::vector<int64_t> deltas, removed;  // their numbers
+  std::vector<MapperStep> steps;
+  std::deque<MapperStep> taken;  // by an earlier life
   std::vector<int32_t> pages;
   std::vector<EndOfStream> ends;
   std::vector<std::string> failures;
@@ -71,6 +85,37 @@ TEST(MapperSession, EachKeyframeIsAnsweredByOneDeltaAndWhatItRemoved) {
   for (int64_t id = 0; id < 4; ++id) EXPECT_EQ(stack.Keyframe(id), State::kAwaitsKeyframe);
   EXPECT_EQ(stack.deltas, (std::vector<int64_t>{0, 1, 2, 3}));
   EXPECT_EQ(stack.removed, stack.deltas);
+}
+
+TEST(MapperSession, StepsOfAnEarlierLifeAreRepeatedWithoutTheirWork) {
+  constexpr int64_t kNum = 14;
+  Stack first(false);
+  std::vector<uint64_t> hashes;
+  for (int64_t id = 0; id < kNum; ++id) {
+    first.Keyframe(id);
+    hashes.push_back(first.session.map().hash());
+  }
+  ASSERT_EQ(first.steps.size(), static_cast<size_t>(kNum));
+  for (const int64_t num_taken : {1, 6, 13}) {
+    Stack second(false);
+    second.taken.assign(first.steps.begin(), first.steps.begin() + num_taken);
+    for (int64_t id = 0; id < kNum; ++id) {
+      second.Keyframe(id);
+      EXPECT_EQ(second.session.map().hash(), hashes[static_cast<size_t>(id)]) << id << " after " << num_taken;
+    }
+    EXPECT_EQ(second.steps.size(), static_cast<size_t>(kNum - num_taken)) << "what is repeated is known already";
+    EXPECT_EQ(second.deltas, first.deltas);
+    EXPECT_EQ(second.removed, first.removed);
+  }
+}
+
+TEST(MapperSession, AStepOfAnotherKeyframeIsRefused) {
+  Stack first(false), second(false);
+  first.Keyframe(0);
+  first.Keyframe(1);
+  second.taken.assign(1, first.steps[1]);
+  EXPECT_EQ(second.Keyframe(0), State::kFailed);
+  EXPECT_THAT(second.failures, testing::ElementsAre(testing::HasSubstr("journal does not fit")));
 }
 
 TEST(MapperSession, AKeyframeWaitsForTheLoopResultsThatAreDueBeforeIt) {

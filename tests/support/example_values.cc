@@ -437,6 +437,21 @@ bool AreSame(const RemovedInDelta& a, const RemovedInDelta& b) {
 }
 
 template <>
+MapperStep DrawValue<MapperStep>(std::mt19937& generator, int size) {
+  return {.is_repeatable = size > 0,
+          .delta = DrawValue<MapDelta>(generator, size),
+          .removed = DrawValue<RemovedInDelta>(generator, size).links,
+          .first_recent = {Draw(generator, 0, 999)},
+          .end_landmark = {Draw(generator, 1000, 2000)}};
+}
+template <>
+bool AreSame(const MapperStep& a, const MapperStep& b) {
+  return a.is_repeatable == b.is_repeatable && AreSame(a.delta, b.delta) &&
+         AreSame(RemovedInDelta{0, a.removed}, RemovedInDelta{0, b.removed}) && a.first_recent == b.first_recent &&
+         a.end_landmark == b.end_landmark;
+}
+
+template <>
 OccupancyUpdate DrawValue<OccupancyUpdate>(std::mt19937& generator, int size) {
   OccupancyUpdate update{.number = Draw(generator, 0, 999),
                          .resolution = DrawReal(generator, 0.01, 1.0),

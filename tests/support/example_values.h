@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "messages/mapper_step.h"
 #include "messages/topics.h"
 #include "wire/codec.h"
 #include "wire/map_file.h"
@@ -36,6 +37,7 @@ void ForEachSentType(Visit visit) {
   visit.template operator()<MapSnapshotPage>();
   visit.template operator()<MapRequest>();
   visit.template operator()<RemovedInDelta>();
+  visit.template operator()<MapperStep>();
   visit.template operator()<LoopResult>();
   visit.template operator()<GlobalAdjustment>();
   visit.template operator()<RelocalizationRequest>();

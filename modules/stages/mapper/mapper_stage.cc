@@ -77,7 +77,7 @@ void MapperStage::Receive(const Topic<Value>& topic) {
 void MapperStage::Advance() {
   while (session_.state() == MapperSession::State::kReady) {
     const StepTimer timer(context_);
-    Do(session_.Advance());
+    Do(session_.Advance(context_.Remembered<MapperStep>()));
   }
   context_.SetQueue(static_cast<int64_t>(session_.num_waiting()));
   while (session_.state() == MapperSession::State::kEnding) Do(session_.Advance());
@@ -95,6 +95,7 @@ void MapperStage::Do(const MapperActions& actions) {
       [this](const RemovedInDelta& removed) { removed_.Publish(removed); },
       [this](const MapSnapshotPage& page) { pages_.Publish(page); },
       [this](const EndOfStream& end) { end_of_stream_.Publish(end); },
+      [this](const MapperStep& step) { context_.Remember(step); },
       [this](const Fail& fail) { context_.Fail(fail.sentence, fail.is_user_error ? 2 : 1); },
       [this](const Finish&) { context_.Finish(); },
   };
