@@ -38,7 +38,8 @@ void RecentLandmarks::Cull(KeyframeId now, const LandmarkCullingOptions& options
 
 void RecentLandmarks::ForgetOld(KeyframeId now, const LandmarkCullingOptions& options, const Map& map) {
   std::erase_if(entries_, [&](const Entry& entry) {
-    return map.FindLandmark(entry.landmark) == nullptr || now.value - entry.created_at.value >= options.recent_keyframes;
+    return map.FindLandmark(entry.landmark) == nullptr ||
+           now.value - entry.created_at.value >= options.recent_keyframes;
   });
 }
 

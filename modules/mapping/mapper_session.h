@@ -39,8 +39,8 @@ struct MapperSessionOptions {
 };
 
 // Values are to be published, but for a MapperStep: that is for the journal.
-using MapperAction =
-    std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream, MapperStep, Fail, Finish>;
+using MapperAction = std::variant<std::shared_ptr<const MapDelta>, RemovedInDelta, MapSnapshotPage, EndOfStream,
+                                  MapperStep, Fail, Finish>;
 using MapperActions = std::vector<MapperAction>;
 
 class MapperSession {

@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <string_view>
 #include <utility>
-#include <utility>
 
 #include "core/crc32.h"
 #include "core/errors.h"

@@ -1,6 +1,7 @@
-// What a stage received, and what it wants to remember of long steps, in a file: the memory that outlives its process. A stage that is killed and started again is
-// given all of it once more, in the same order. As what it says is a pure function of that, it comes to the state that
-// it had, and makes the same messages with the same numbers in the same streams: nobody else notices more than a pause.
+// What a stage received, and what it wants to remember of long steps, in a file: the memory that outlives its process.
+// A stage that is killed and started again is given all of it once more, in the same order. As what it says is a pure
+// function of that, it comes to the state that it had, and makes the same messages with the same numbers in the same
+// streams: nobody else notices more than a pause.
 //
 // The file is a row of entries, each with its length and its CRC-32 in front. It is cut off where the first one is not
 // whole: nobody has seen what would have followed from that.
@@ -64,11 +65,11 @@ class Journal {
   int64_t epoch_us_ = 0;
   bool is_lost_ = false;
   std::unique_ptr<std::FILE, CloseFile> reader_;
-  bool is_at_end_ = false;         // of what is whole in it
-  std::optional<Entry> ahead_;     // was read, and not given yet
-  int64_t size_ = 0;       // of the file when it was opened for reading
-  int64_t num_bytes_ = 0;  // of whole entries, as far as they are read or written
-  int file_ = -1;          // that is written
+  bool is_at_end_ = false;      // of what is whole in it
+  std::optional<Entry> ahead_;  // was read, and not given yet
+  int64_t size_ = 0;            // of the file when it was opened for reading
+  int64_t num_bytes_ = 0;       // of whole entries, as far as they are read or written
+  int file_ = -1;               // that is written
 };
 
 }  // namespace tessera

@@ -104,6 +104,31 @@ TEST_F(JournalTest, WhatIsNotWholeIsCutOff) {
   expect_two(whole.substr(0, whole.size() - last) + std::string(5000, '\0'));
 }
 
+TEST_F(JournalTest, AnEntryIsGivenByItsNameOrInItsTurn) {
+  {
+    Journal journal(path_, 77, kMaxBytes);
+    EXPECT_FALSE(journal.NextOf("step")) << "nothing is replayed";
+    for (const char* name : {"POSE", "step", "step", "POSE"}) ASSERT_TRUE(journal.Append(name, MessageOf(0), 1000));
+  }
+  // The last one is cut off, and its rest must not be taken for entries.
+  const std::string whole = folder_.Read("journal/tracker.journal");
+  folder_.Write("journal/tracker.journal", whole.substr(0, whole.size() - 20));
+  Journal journal(path_, 78, kMaxBytes);
+  EXPECT_FALSE(journal.NextOf("step")) << "another one comes before it";
+  EXPECT_EQ(journal.Next()->channel, "POSE");
+  EXPECT_EQ(journal.NextOf("step")->message, MessageOf(0));
+  EXPECT_EQ(journal.Next()->channel, "step") << "nobody asked for it by its name";
+  EXPECT_FALSE(journal.NextOf("step"));
+  EXPECT_TRUE(journal.is_replaying());
+  EXPECT_FALSE(journal.Next());
+  EXPECT_FALSE(journal.is_replaying());
+  ASSERT_TRUE(journal.Append("POSE", MessageOf(1), 1001));
+  Journal next(path_, 79, kMaxBytes);
+  std::vector<std::string> names;
+  while (const auto entry = next.Next()) names.push_back(entry->channel);
+  EXPECT_EQ(names, (std::vector<std::string>{"POSE", "step", "step", "POSE"}));
+}
+
 TEST_F(JournalTest, OneThatGrowsTooLargeIsGivenUpAndGivesItsRoomBack) {
   {
     Journal journal(path_, 77, 1000);
@@ -140,6 +165,7 @@ TEST_F(JournalTest, AFolderThatCantBeMadeIsAUserError) {
 }
 
 // Says for each pose how many came so far, and each time a timer tells it to, a question, which follows from nothing.
+// To count is a long step, of which the result is remembered.
 class Counter {
  public:
   explicit Counter(StageContext& context)
@@ -147,16 +173,22 @@ class Counter {
         results_(context.Advertise(kLoopResult)),
         questions_(context.Advertise(kMapRequest)) {
     context.Subscribe(kPose, [this](const PoseEstimate& pose) {
-      results_.Publish({.answers = {pose.frame.value}, .num_candidates = static_cast<int32_t>(++num_poses_)});
+      const std::optional<MapRequest> remembered = context_.Remembered<MapRequest>();
+      if (!remembered) ++num_steps_;
+      num_poses_ = remembered ? remembered->next_delta : num_poses_ + 1;
+      if (!remembered) context_.Remember(MapRequest{.next_delta = num_poses_});
+      results_.Publish({.answers = {pose.frame.value}, .num_candidates = static_cast<int32_t>(num_poses_)});
       questions_.Publish({.next_delta = num_poses_});
     });
     context.Every(std::chrono::milliseconds(10), [this] { questions_.Publish({.next_delta = num_poses_}); });
   }
   int64_t num_poses() const { return num_poses_; }
+  int64_t num_steps() const { return num_steps_; }
 
  private:
   StageContext& context_;
   int64_t num_poses_ = 0;
+  int64_t num_steps_ = 0;
   Publisher<LoopResult> results_;
   Publisher<MapRequest> questions_;
 };
@@ -252,6 +284,20 @@ TEST_F(ContinuedStreams, WhatDoesNotFollowFromTheJournalIsNotRepeated) {
   EXPECT_EQ(counter.num_poses(), 10);
   ASSERT_FALSE(questions_.empty());
   for (const int64_t number : questions_) EXPECT_EQ(number, 10);
+}
+
+TEST_F(ContinuedStreams, WhatIsRememberedOfLongStepsIsNotDoneAgain) {
+  for (int64_t num_poses = 10; num_poses <= 30; num_poses += 10) {
+    const Counter& counter = bus_.Start<Counter>("counter");
+    Wait();
+    EXPECT_EQ(counter.num_poses(), num_poses - 10);
+    EXPECT_EQ(counter.num_steps(), 0);
+    PublishPoses(num_poses - 10, num_poses);
+    ASSERT_TRUE(RunUntilResults(static_cast<size_t>(num_poses)));
+    EXPECT_EQ(counter.num_steps(), 10);
+    Kill();
+  }
+  ExpectResults(30);
 }
 
 TEST_F(ContinuedStreams, WithoutAFolderThereIsNoJournal) {
