@@ -60,7 +60,7 @@ class Mapper {
   // function of all input so far; it asks for a global adjustment after a loop was closed, unless one is under way.
   // Throws std::invalid_argument if the id is not new or the lists do not fit the keypoints.
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
-  // The last step of Process, for Repeat.
+  // What Repeat needs of the last step of Process, which returned `delta`.
   MapperStep LastStep(const MapDelta& delta) const;
   // Takes a step that Process took in an earlier life, on the same input: a hundredth of the work, and the same from
   // then on. `step`, which must be repeatable, is what LastStep said then. Fails, and can't go on, if it does not fit.
