@@ -260,8 +260,8 @@ def _differences(outcomes: list[Outcome]) -> list[str]:
     first, second = outcomes
     found = []
     if first.settings != second.settings:
-        one, two = (", ".join(each.settings) or "none" for each in outcomes)
-        found.append(f"The settings that --set changed differ: {one} and {two}.")
+        changed = [", ".join(each.settings) or "none" for each in outcomes]
+        found.append(f"The settings that --set changed differ: {changed[0]} and {changed[1]}.")
     if first.sequence != second.sequence or first.num_frames != second.num_frames:
         found.append(
             f"The sequences differ: {first.sequence}, {first.num_frames} frames, and {second.sequence}, "

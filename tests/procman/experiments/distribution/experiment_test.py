@@ -34,9 +34,9 @@ def test_two_hosts_make_what_one_makes(
     tessera: Tessera, sequence: Path, reference_run: Finished, tmp_path: Path
 ) -> None:
     options = ("--extractors", 2, "--tiles", "2x2", "--repetitions", 1, "--no-faults", "--port", tessera.next_port())
-    options += ("--set", "dispatcher.pack_tiles=false")
+    as_they_are = ("--set", "dispatcher.pack_tiles=false")
     finished = tessera.command(
-        "experiment", "homogeneous", f"kitti:{sequence}", *options, "--out", tmp_path / "out"
+        "experiment", "homogeneous", f"kitti:{sequence}", *options, *as_they_are, "--out", tmp_path / "out"
     ).must_end_well()
     assert "met: one trajectory and one map, bit for bit: 2 runs" in finished.out
     results = json.loads((tmp_path / "out" / "homogeneous.json").read_text())
