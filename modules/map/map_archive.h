@@ -31,8 +31,8 @@ class MapArchive {
   // What to send to one who asks. Nothing if the asker lacks nothing, or if there is no map yet.
   Answer AnswerTo(const MapRequest& request);
 
-  // The map that is handed out has at least the first delta, or is the one that the owner began with. Else it is this
-  // old to twice as old, in deltas, or older than the awaited delta.
+  // The map that is handed out is the first that there was, or so many deltas old, up to twice as many; while a delta
+  // is awaited, it is older than that one.
   static constexpr int64_t kDelay = 48;
 
  private:

@@ -23,17 +23,15 @@ void RecentLandmarks::Add(KeyframeId created_at, const std::vector<LandmarkId>& 
 
 void RecentLandmarks::Cull(KeyframeId now, const LandmarkCullingOptions& options, MapEditor& editor) {
   const Map& map = editor.map();
-  std::erase_if(entries_, [&](const Entry& entry) {
-    if (map.FindLandmark(entry.landmark) == nullptr) return true;
+  for (const Entry& entry : entries_) {
     const auto num_observations = static_cast<int>(map.ObservationsOf(entry.landmark).size());
-    const int64_t age = now.value - entry.created_at.value;
     // A pair created it; a third observation must come one keyframe before it counts as old.
-    if (age >= options.recent_keyframes - 1 && num_observations < options.min_observations) {
+    const bool must_be_seen = now.value - entry.created_at.value >= options.recent_keyframes - 1;
+    if (must_be_seen && num_observations < options.min_observations && map.FindLandmark(entry.landmark) != nullptr) {
       editor.RemoveLandmark(entry.landmark);
-      return true;
     }
-    return age >= options.recent_keyframes;
-  });
+  }
+  ForgetOld(now, options, map);
 }
 
 void RecentLandmarks::ForgetOld(KeyframeId now, const LandmarkCullingOptions& options, const Map& map) {

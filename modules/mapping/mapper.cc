@@ -70,7 +70,7 @@ Mapper::Mapper(const MapperOptions& options) : options_(options), keyframe_culle
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
-  const bool has_new_focal = options_.refines_focal && RefineFocal(seen, editor);
+  const bool has_new_focal = RefineFocal(seen, editor);
   is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_focal;
   Insert(seen, editor);
   RememberMotion(seen);
@@ -106,10 +106,8 @@ MapperStep Mapper::LastStep(const MapDelta& delta) const {
 Result<> Mapper::Repeat(const KeyframeObservation& seen, const MapperStep& step) {
   const MapDelta& delta = step.delta;
   if (delta.answers != seen.id) return Failed("it is a step of keyframe " + std::to_string(delta.answers.value));
-  if (options_.refines_focal) {
-    MapEditor editor(map_);
-    RefineFocal(seen, editor);
-  }
+  MapEditor before(map_);
+  RefineFocal(seen, before);  // which finds nothing, but counts its looks
   TESSERA_RETURN_IF_FAILED(map_.Apply(delta));
   map_.RaiseEnd(step.end_landmark);
   RememberMotion(seen);
@@ -177,7 +175,8 @@ bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId n
 
 // Poses move: what loops and an adjustment under way are measured against is gone.
 bool Mapper::RefineFocal(const KeyframeObservation& seen, MapEditor& editor) {
-  if (!focal_refiner_.Refine(seen.id, seen.features.calibration, editor)) return false;
+  const CameraCalibration& given = seen.features.calibration;
+  if (!options_.refines_focal || !focal_refiner_.Refine(seen.id, given, editor)) return false;
   last_corrected_ = seen.id;
   is_base_outdated_ = base_.has_value();
   wants_adjustment_ |= is_base_outdated_;

@@ -62,7 +62,7 @@ class Mapper {
   MapDelta Process(const KeyframeObservation& seen, const DueCorrections& due = {});
   // What Repeat needs of the last step of Process, which returned `delta`.
   MapperStep LastStep(const MapDelta& delta) const;
-  // Takes a step that Process took in an earlier life, on the same input: a hundredth of the work, and the same from
+  // Takes a step that Process took in an earlier life, on the same input: without its work, and is the same mapper from
   // then on. `step`, which must be repeatable, is what LastStep said then. Fails, and can't go on, if it does not fit.
   Result<> Repeat(const KeyframeObservation& seen, const MapperStep& step);
   // Applies the corrections that are due when no further keyframe will come, and asks for a last global adjustment

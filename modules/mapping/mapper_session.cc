@@ -7,7 +7,7 @@
 namespace tessera {
 
 Result<> MapperSessionOptions::Check() const {
-  // A loop closer that is started again finds the keyframe in the last snapshot but one.
+  // A loop closer that is started again finds the keyframe in the deltas since the map that it is given.
   if (delays.loop_keyframes < 1 || delays.loop_keyframes >= MapArchive::kDelay) {
     return Failed("a loop must be applied 1 to " + std::to_string(MapArchive::kDelay - 1) + " keyframes later");
   }

@@ -68,7 +68,7 @@ Vocabulary::Vocabulary(VocabularyTree tree) : tree_(std::move(tree)) {
   }
 }
 
-// The least of distance * 256 + child: no branch, which would be a guess at each child.
+// The least of distance * 256 + child: no branch to be mispredicted.
 size_t Vocabulary::NearestChild(size_t node, const Descriptor& descriptor) const {
   static_assert(VocabularyTree::kMaxChildren < 256);
   const auto first = static_cast<size_t>(first_child_[node]);
@@ -80,8 +80,7 @@ size_t Vocabulary::NearestChild(size_t node, const Descriptor& descriptor) const
   return first + (nearest & 0xff);
 }
 
-// All descriptors go down together, level by level: so the memory that one of them waits for keeps no other from its
-// step.
+// All descriptors go down together, level by level: while one waits for memory, others go on.
 std::vector<Vocabulary::Leaf> Vocabulary::FindLeaves(const std::vector<Descriptor>& descriptors) const {
   std::vector<size_t> nodes(descriptors.size(), 0);
   std::vector<Leaf> leaves(descriptors.size(), Leaf{0, 0});

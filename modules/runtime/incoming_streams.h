@@ -51,6 +51,8 @@ class IncomingStreams {
   // What is delivered on these channels, which are to be added after this, goes into the journal before. As long as
   // that one is replayed, nothing else is heard on them.
   void KeepJournal(const std::set<std::string>& channels, Journal* journal);
+  // Behind what is in the journal; nothing as long as that is replayed.
+  void WriteJournal(const std::string& channel, ByteView message, int64_t arrival_us);
   // Delivers a message that was delivered in an earlier life.
   void Replay(const Journal::Entry& entry);
   // All that is in the journal was replayed: listens to its channels.
@@ -85,7 +87,6 @@ class IncomingStreams {
   };
   enum class Sender { kMember, kOutside, kStranger };
   void Open(Subscription& subscription);
-  void WriteJournal(const std::string& channel, ByteView message, int64_t arrival_us);
   void OnMessage(Subscription& subscription, ByteView message, int64_t arrival_us);
   // Whether a camera outside of the run may speak on the channel (without prefix).
   bool IsOpen(const std::string& channel) const;

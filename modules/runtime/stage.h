@@ -82,8 +82,9 @@ class StageContext {
   // it there, and need not take the step again. nullopt: nothing is known of this step, which has to be taken.
   template <class Value>
   void Remember(const Value& value) {
-    if (remembers())
-      Remember(TypeName<Value>(), EncodeValue(value, {.publisher = name(), .epoch_us = epoch_us()}, kWhole).front());
+    if (!remembers()) return;
+    const MessageHeader header{.publisher = name(), .epoch_us = epoch_us()};
+    Remember(TypeName<Value>(), EncodeValue(value, header, kWhole).front());
   }
   template <class Value>
   std::optional<Value> Remembered() {

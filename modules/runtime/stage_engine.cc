@@ -162,9 +162,7 @@ void StageEngine::KeepJournal(const std::vector<Channel>& inputs, const std::vec
 }
 
 void StageEngine::Remember(const std::string& name, ByteView message) {
-  if (const Result<> written = journal_->Append(name, message, clock_->NowUs()); !written) {
-    ReportError(written.error().sentence);
-  }
+  incoming_.WriteJournal(name, message, clock_->NowUs());
 }
 
 std::optional<Bytes> StageEngine::Remembered(const std::string& name) {

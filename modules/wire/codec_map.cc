@@ -189,12 +189,7 @@ struct Layout<mapper_step_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& step) {
     fields(message.is_repeatable, step.is_repeatable);
-    fields.Key(message.number, step.delta.number);
-    fields(message.answers, step.delta.answers);
-    fields.Bits(message.hash, step.delta.hash);
-    fields(message.asks_adjustment, step.delta.asks_adjustment);
-    fields.Check(step.delta.number >= 0, "its number is negative");
-    fields(message.change, step.delta);
+    Layout<map_delta_t>::Describe(fields, message, step.delta);  // its fields have the same names
     fields.List(message.num_ties, message.ties, step.removed);
     fields(message.first_recent, step.first_recent);
     fields(message.end_landmark, step.end_landmark);

@@ -45,7 +45,7 @@ class StackRunner:
         port: int,
         settings: list[str],
     ) -> None:
-        """`settings`: section.key=value, for all runs; what a configuration says comes before them."""
+        """`settings`: section.key=value, for all runs; what a configuration sets itself wins."""
         self._experiment, self._lan, self._nodes, self._commands = experiment, lan, nodes, commands
         self._port, self._settings = port, settings
 
