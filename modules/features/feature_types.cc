@@ -19,4 +19,17 @@ Result<> FeatureOptions::Check() const {
   return CheckRange("max_disparity_px", max_disparity_px, 1, kMaxDisparityPx);
 }
 
+FeatureFrame WithLens(FeatureFrame features, const LensCorrection& lens) {
+  const CameraCalibration seen = features.calibration;
+  features.calibration = WithLens(seen, lens);
+  if (features.calibration.radial == seen.radial) return features;
+  for (Keypoint& keypoint : features.keypoints) {
+    const Eigen::Vector2d pixel = BeforeLens(seen, seen.radial, {keypoint.x_px, keypoint.y_px});
+    const Eigen::Vector2d moved = MovedByLens(seen, features.calibration.radial, pixel);
+    keypoint.x_px = static_cast<float>(moved.x());
+    keypoint.y_px = static_cast<float>(moved.y());
+  }
+  return features;
+}
+
 }  // namespace tessera

@@ -37,4 +37,20 @@ Result<> CameraCalibration::Check() const {
   return {};
 }
 
+Eigen::Vector2d MovedByLens(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& pixel) {
+  const Eigen::Vector2d center(calibration.cx_px, calibration.cy_px);
+  const double half_width_px = 0.5 * calibration.width_px;
+  return pixel + radial * (pixel - center).squaredNorm() / (half_width_px * half_width_px) * (pixel - center);
+}
+
+Eigen::Vector2d BeforeLens(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& moved) {
+  const Eigen::Vector2d from_center = moved - Eigen::Vector2d(calibration.cx_px, calibration.cy_px);
+  const double distance = from_center.norm() / (0.5 * calibration.width_px);
+  if (distance == 0.0) return moved;
+  constexpr int kNumSteps = 5;  // Newton's, of r + radial r^3 = distance
+  double r = distance;
+  for (int i = 0; i < kNumSteps; ++i) r -= (r + radial * r * r * r - distance) / (1.0 + 3.0 * radial * r * r);
+  return moved + (r / distance - 1.0) * from_center;
+}
+
 }  // namespace tessera

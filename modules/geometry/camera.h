@@ -31,6 +31,9 @@ struct CameraCalibration {
   double cy_px = 0.0;
   double baseline_m = 0.0;    // stereo: distance from left to right camera; otherwise 0
   double depth_unit_m = 0.0;  // RGB-D: meters per count of the depth image; otherwise 0
+  // By which share points at the image's left or right edge were moved away from the center, since the images turned
+  // out to be distorted (MovedByLens). 0: they stand where they were seen.
+  double radial = 0.0;
 
   bool operator==(const CameraCalibration&) const = default;
 
@@ -47,27 +50,39 @@ struct CameraCalibration {
   }
 };
 
-// The focal lengths that a camera turns out to have, where they are others than its calibration says.
-struct FocalLengths {
-  double fx_px = 0.0;  // 0: as calibrated
+// What a camera turns out to have, where that is other than its calibration says.
+struct LensCorrection {
+  double fx_px = 0.0;  // focal lengths; 0: as calibrated
   double fy_px = 0.0;
+  double radial = 0.0;  // as CameraCalibration::radial
 
   bool is_known() const { return fx_px > 0.0; }
-  bool operator==(const FocalLengths&) const = default;
+  bool operator==(const LensCorrection&) const = default;
 };
 
 // By which share a camera's focal length may differ from its calibration; beyond it, something else is wrong.
 inline constexpr double kMaxFocalError = 0.03;
+// Likewise CameraCalibration::radial, either way.
+inline constexpr double kMaxRadial = 0.03;
 
-// By which share of the calibration's they differ from it; 0 where none are known.
-inline double FocalError(const FocalLengths& focal, const CameraCalibration& calibration) {
-  return focal.is_known() ? focal.fx_px / calibration.fx_px - 1.0 : 0.0;
+// By which share of the calibration's focal lengths those of the correction differ; 0 where none are known.
+inline double FocalError(const LensCorrection& lens, const CameraCalibration& calibration) {
+  return lens.is_known() ? lens.fx_px / calibration.fx_px - 1.0 : 0.0;
 }
 
-// The calibration with these focal lengths; itself where none are known.
-inline CameraCalibration WithFocal(CameraCalibration calibration, const FocalLengths& focal) {
-  if (focal.is_known()) std::tie(calibration.fx_px, calibration.fy_px) = std::pair(focal.fx_px, focal.fy_px);
+// The calibration with this correction; itself where none is known.
+inline CameraCalibration WithLens(CameraCalibration calibration, const LensCorrection& lens) {
+  if (!lens.is_known()) return calibration;
+  std::tie(calibration.fx_px, calibration.fy_px, calibration.radial) = std::tuple(lens.fx_px, lens.fy_px, lens.radial);
   return calibration;
 }
+
+// Where a pixel stands in an image whose distortion is corrected by `radial`, with r = |pixel - center| over half the
+// image's width:
+//
+//   moved - center = (1 + radial r^2) (pixel - center)
+Eigen::Vector2d MovedByLens(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& pixel);
+// The inverse, for what lies within two half widths.
+Eigen::Vector2d BeforeLens(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& moved);
 
 }  // namespace tessera

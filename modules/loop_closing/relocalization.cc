@@ -45,7 +45,7 @@ RelocalizationAnswer Relocalize(const Map& map, const PlaceDatabase& places, con
                                 const RelocalizationOptions& options) {
   RelocalizationAnswer answer;
   answer.frame = request.features.frame;
-  const auto view = std::make_shared<const FrameView>(map.Calibrated(request.features));
+  const auto view = std::make_shared<const FrameView>(WithLens(request.features, map.lens()));
   const BagOfWords bag = vocabulary.Describe(view->features().descriptors);
   const std::vector<KeyframeId> found = FindPlaces(map, places, bag, candidates);
   answer.num_candidates = static_cast<int32_t>(found.size());

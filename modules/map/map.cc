@@ -41,6 +41,7 @@ uint64_t HashOf(const FeatureFrame& features) {
        {camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.baseline_m, camera.depth_unit_m}) {
     hash.Add(number);
   }
+  if (camera.radial != 0.0) hash.Add(camera.radial);  // most cameras have none: maps made before keep their hashes
   for (size_t i = 0; i < features.keypoints.size(); ++i) {
     const Keypoint& k = features.keypoints[i];
     hash.Add(uint64_t{std::bit_cast<uint32_t>(k.x_px)} << 32 | std::bit_cast<uint32_t>(k.y_px));
@@ -136,7 +137,7 @@ Result<> Map::Apply(const MapDelta& delta) {
 }
 
 Result<> Map::ApplyLists(const MapDelta& delta) {
-  if (delta.focal.is_known()) ChangeFocal(delta.focal);
+  if (delta.lens.is_known()) ChangeLens(delta.lens);
   for (const auto& added : delta.new_keyframes) TESSERA_RETURN_IF_FAILED(AddKeyframe(added));
   for (const auto& moved : delta.moved_keyframes) TESSERA_RETURN_IF_FAILED(MoveKeyframe(moved));
   for (const auto& changed : delta.changed_landmarks) TESSERA_RETURN_IF_FAILED(ChangeLandmark(changed));
@@ -154,20 +155,15 @@ Result<> Map::ApplyLists(const MapDelta& delta) {
   return {};
 }
 
-void Map::ChangeFocal(const FocalLengths& focal) {
-  focal_ = focal;
+void Map::ChangeLens(const LensCorrection& lens) {
+  lens_ = lens;
   keyframes_.ForEach([&](KeyframeId id, const Keyframe& held) {
     Keyframe& keyframe = *keyframes_.Find(id);
     hash_ -= HashOf(id, held);
-    keyframe.features = std::make_shared<const FeatureFrame>(Calibrated(*held.features));
+    keyframe.features = std::make_shared<const FeatureFrame>(WithLens(*held.features, lens_));
     keyframe.features_hash = HashOf(*keyframe.features);
     hash_ += HashOf(id, held);
   });
-}
-
-FeatureFrame Map::Calibrated(FeatureFrame features) const {
-  features.calibration = WithFocal(features.calibration, focal_);
-  return features;
 }
 
 Result<> Map::AddKeyframe(const MapDelta::NewKeyframe& added) {
@@ -376,7 +372,7 @@ MapDelta Map::Snapshot() const {
   delta.answers = answered_;
   delta.is_snapshot = true;
   delta.hash = hash_;
-  delta.focal = focal_;
+  delta.lens = lens_;
   size_t num_observations = 0;
   landmarks_.ForEach(
       [&](LandmarkId, const ObservedLandmark& landmark) { num_observations += landmark.observations.span().size(); });

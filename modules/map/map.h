@@ -117,7 +117,7 @@ struct MapDelta {
   int64_t number = 0;        // counts from 0; a replica applies them in order
   KeyframeId answers;        // the keyframe whose processing made this delta: its logical time
   bool is_snapshot = false;  // starts from the empty map, whatever the replica held
-  FocalLengths focal;        // that all keyframes have from now on; new_keyframes bring them. Not known: as before
+  LensCorrection lens;       // of all keyframes from now on; new_keyframes bring it. Not known: as before
   std::vector<NewKeyframe> new_keyframes;
   std::vector<MovedKeyframe> moved_keyframes;
   std::vector<ChangedLandmark> changed_landmarks;  // new ones too
@@ -159,10 +159,8 @@ class Map {
   }
   const IdMap<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   const IdMap<LandmarkId, ObservedLandmark>& landmarks() const { return landmarks_; }
-  // Those of all keyframes, where the mapper found others than the calibration says; else not known.
-  const FocalLengths& focal() const { return focal_; }
-  // What the source's camera saw, as the map's camera sees it: with these focal lengths.
-  FeatureFrame Calibrated(FeatureFrame features) const;
+  // That of all keyframes, where the mapper found the calibration wrong; else not known.
+  const LensCorrection& lens() const { return lens_; }
   // In the order in which they were closed. Their keyframes stay in the map.
   const std::vector<ClosedLoop>& closed_loops() const { return closed_loops_; }
 
@@ -180,7 +178,7 @@ class Map {
   friend class MapEditor;  // the owner applies its edits one by one, and counts them as one delta
 
   Result<> ApplyLists(const MapDelta& delta);
-  void ChangeFocal(const FocalLengths& focal);
+  void ChangeLens(const LensCorrection& lens);
   Result<> AddKeyframe(const MapDelta::NewKeyframe& added);
   Result<> MoveKeyframe(const MapDelta::MovedKeyframe& moved);
   Result<> ChangeLandmark(const MapDelta::ChangedLandmark& changed);
@@ -198,7 +196,7 @@ class Map {
   IdMap<KeyframeId, Keyframe> keyframes_;
   IdMap<LandmarkId, ObservedLandmark> landmarks_;
   std::vector<ClosedLoop> closed_loops_;
-  FocalLengths focal_;
+  LensCorrection lens_;
   int64_t next_delta_ = 0;
   KeyframeId answered_;
   uint64_t hash_ = 0;

@@ -105,16 +105,16 @@ void MapEditor::AddClosedLoop(const ClosedLoop& loop) {
   closed_loops_.push_back(loop);
 }
 
-void MapEditor::ChangeFocal(const FocalLengths& focal) {
-  if (!new_keyframes_.empty()) throw std::logic_error("map editor: focal lengths change before keyframes are added");
-  map_.ChangeFocal(focal);
-  focal_ = focal;
+void MapEditor::ChangeLens(const LensCorrection& lens) {
+  if (!new_keyframes_.empty()) throw std::logic_error("map editor: the lens changes before keyframes are added");
+  map_.ChangeLens(lens);
+  lens_ = lens;
 }
 
 MapDelta MapEditor::Finish(KeyframeId answers) {
   MapDelta delta;
   delta.number = number_;
-  delta.focal = focal_;
+  delta.lens = lens_;
   delta.closed_loops = closed_loops_;
   delta.answers = answers;
   for (const auto& [id, added] : new_keyframes_) {

@@ -44,7 +44,7 @@ class MapEditor {
   void AddClosedLoop(const ClosedLoop& loop);
 
   // Before any keyframe is added.
-  void ChangeFocal(const FocalLengths& focal);
+  void ChangeLens(const LensCorrection& lens);
 
   // Landmarks whose position or observations changed and that still exist, by id: what derives from them is stale.
   const IdSet<LandmarkId>& touched_landmarks() const { return touched_; }
@@ -68,7 +68,7 @@ class MapEditor {
   IdSet<KeyframeId> changed_poses_, changed_parents_, removed_keyframes_;
   IdSet<LandmarkId> new_landmarks_, changed_landmarks_, removed_landmarks_, touched_, reobserved_;
   std::vector<ClosedLoop> closed_loops_;
-  FocalLengths focal_;
+  LensCorrection lens_;
   std::vector<ObservationEdit> observations_;  // in the order of the edits
 };
 

@@ -41,7 +41,7 @@ MapSnapshotPage CutSnapshotPage(const MapDelta& snapshot, int32_t page) {
   cut.part.answers = snapshot.answers;
   cut.part.is_snapshot = true;
   cut.part.hash = snapshot.hash;
-  cut.part.focal = snapshot.focal;
+  cut.part.lens = snapshot.lens;
   if (page == 0) cut.part.closed_loops = snapshot.closed_loops;
   auto left = static_cast<size_t>(page);
   const size_t num_keyframe_pages = NumPages(snapshot.new_keyframes.size(), kKeyframesPerPage);

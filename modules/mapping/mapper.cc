@@ -176,7 +176,7 @@ bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId n
 // Poses move: what loops and an adjustment under way are measured against is gone.
 bool Mapper::RefineFocal(const KeyframeObservation& seen, MapEditor& editor) {
   const CameraCalibration& given = seen.features.calibration;
-  if (!options_.refines_focal || !focal_refiner_.Refine(seen.id, given, editor)) return false;
+  if (!options_.refines_focal || !lens_refiner_.Refine(seen.id, given, editor)) return false;
   last_corrected_ = seen.id;
   is_base_outdated_ = base_.has_value();
   wants_adjustment_ |= is_base_outdated_;
@@ -203,7 +203,7 @@ void Mapper::Insert(const KeyframeObservation& seen, MapEditor& editor) {
   const Sim3 world_from_keyframe =
       world_from_reference ? *world_from_reference * seen.reference_from_camera : Sim3::From(seen.world_from_camera);
   editor.AddKeyframe(seen.id, removed_.Successor(map_, seen.reference), world_from_keyframe,
-                     std::make_shared<const FeatureFrame>(map_.Calibrated(seen.features)));
+                     std::make_shared<const FeatureFrame>(WithLens(seen.features, map_.lens())));
 }
 
 void Mapper::RememberMotion(const KeyframeObservation& seen) {

@@ -9,11 +9,11 @@
 #include "map/map.h"
 #include "map/removed_keyframes.h"
 #include "mapping/correction_schedule.h"
-#include "mapping/focal_refiner.h"
 #include "mapping/keyframe_culling.h"
 #include "mapping/landmark_creation.h"
 #include "mapping/landmark_culling.h"
 #include "mapping/landmark_fusion.h"
+#include "mapping/lens_refiner.h"
 #include "mapping/map_correction.h"
 #include "messages/mapper_step.h"
 #include "messages/tracking_types.h"
@@ -72,7 +72,7 @@ class Mapper {
   const Map& map() const { return map_; }
   // Loops that were ignored since the map was corrected after they were found: the next keyframes find them again.
   int64_t num_void_loops() const { return num_void_loops_; }
-  const FocalRefiner& focal_refiner() const { return focal_refiner_; }
+  const LensRefiner& lens_refiner() const { return lens_refiner_; }
   // The poses of culled keyframes.
   const RemovedKeyframes& removed_keyframes() const { return removed_; }
 
@@ -98,7 +98,7 @@ class Mapper {
   RecentLandmarks recent_landmarks_;
   RemovedKeyframes removed_;
   KeyframeCuller keyframe_culler_;
-  FocalRefiner focal_refiner_;
+  LensRefiner lens_refiner_;
   bool is_repeatable_ = false;          // the last step: no corrections, which have states of their own
   LandmarkId first_recent_;             // of the last step
   KeyframeId last_corrected_;           // the delta that answers it corrected the map

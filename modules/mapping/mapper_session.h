@@ -69,7 +69,7 @@ class MapperSession {
   State state() const;
   size_t num_waiting() const { return waiting_.size(); }  // keyframes
   const Map& map() const { return mapper_.map(); }
-  const FocalRefiner& focal_refiner() const { return mapper_.focal_refiner(); }
+  const LensRefiner& lens_refiner() const { return mapper_.lens_refiner(); }
 
  private:
   // The last keyframe that gets a loop result; invalid: there are none.

@@ -25,7 +25,8 @@ double Baseline(const CameraCalibration& calibration);
 // The keypoint as a measurement, with the noise of its level; a depth as the right column that it stands for.
 inline PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint) {
   const Keypoint& k = features.keypoints[static_cast<size_t>(keypoint)];
-  PixelObservation seen{{k.x_px, k.y_px}, kNoColumn, kKeypointSigmaPx * LevelScale(k.level)};
+  PixelObservation seen{
+      {k.x_px, k.y_px}, kNoColumn, KeypointSigmaPx(features.calibration.sensor) * LevelScale(k.level)};
   if (features.calibration.sensor == SensorType::kStereo) {
     seen.right_x_px = k.right_x_px >= 0.0F && k.right_x_px < k.x_px ? k.right_x_px : kNoColumn;
   } else if (features.calibration.sensor == SensorType::kRgbd && k.depth_m > 0.0F) {

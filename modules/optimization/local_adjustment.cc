@@ -61,7 +61,7 @@ size_t FindPose(const BundleProblem& problem, KeyframeId id) {
 
 // Constraints of the double window. Two outer poses have one constraint, whichever of them chose the other.
 void AddConstraints(const Map& map, size_t num_inner, BundleProblem& problem) {
-  const double rad_per_px = kKeypointSigmaPx / problem.calibration.fx_px;
+  const double rad_per_px = KeypointSigmaPx(problem.calibration.sensor) / problem.calibration.fx_px;
   std::set<std::pair<size_t, size_t>> constrained;
   for (size_t i = num_inner; i < problem.poses.size(); ++i) {
     const Keyframe& keyframe = *map.FindKeyframe(problem.poses[i].id);

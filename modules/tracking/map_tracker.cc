@@ -97,7 +97,7 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
-  const auto view = std::make_shared<const FrameView>(replica_.map().Calibrated(features));
+  const auto view = std::make_shared<const FrameView>(WithLens(features, replica_.map().lens()));
   calibration_ = features.calibration;
   const State before = state();
   MapTrackingResult result = UndecidedResult(*view);
@@ -594,7 +594,9 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   KeyframeObservation keyframe;
   keyframe.id = next_keyframe_;
   keyframe.features = frame.view->features();
+  // The focal lengths of the source: the mapper may have found others since. Keypoints stay where the lens moved them.
   keyframe.features.calibration = calibration_;
+  keyframe.features.calibration.radial = frame.view->calibration().radial;
   keyframe.world_from_camera = frame.world_from_camera;
   keyframe.reference = reference;
   keyframe.reference_from_camera = reference_from_camera;

@@ -69,9 +69,9 @@ TrackerActions TrackerSession::Advance() {
 // The map that the session begins with, if any, must have been made with this camera.
 bool TrackerSession::FitsMap(const CameraCalibration& camera) {
   if (fits_map_ || tracker_.map().keyframes().size() == 0) return true;
-  const FocalLengths& focal = tracker_.map().focal();
-  fits_map_ = std::abs(FocalError(focal, camera)) <= kMaxFocalError;
-  const CameraCalibration seen = WithFocal(camera, focal);
+  const LensCorrection& lens = tracker_.map().lens();
+  fits_map_ = std::abs(FocalError(lens, camera)) <= kMaxFocalError;
+  const CameraCalibration seen = WithLens(camera, lens);
   tracker_.map().keyframes().ForEach(
       [&](KeyframeId, const Keyframe& keyframe) { fits_map_ &= keyframe.features->calibration == seen; });
   return fits_map_;

@@ -76,10 +76,12 @@ struct Layout<map_change_t> {
   static void Describe(Fields& fields, Message& message, Value& delta) {
     using Moved = MapDelta::MovedKeyframe;
     using Parent = MapDelta::ChangedParent;
-    fields(message.fx, delta.focal.fx_px);
-    fields(message.fy, delta.focal.fy_px);
-    fields.Check((delta.focal.fx_px > 0.0) == (delta.focal.fy_px > 0.0) && delta.focal.fx_px >= 0.0,
+    fields(message.fx, delta.lens.fx_px);
+    fields(message.fy, delta.lens.fy_px);
+    fields.Check((delta.lens.fx_px > 0.0) == (delta.lens.fy_px > 0.0) && delta.lens.fx_px >= 0.0,
                  "its focal lengths are out of range");
+    fields(message.radial, delta.lens.radial);
+    fields.Check(IsRadial(delta.lens.radial), "its radial distortion is out of range");
     fields.CutList(message.num_new_keyframes, message.new_keyframes, delta.new_keyframes);
     auto& moved = delta.moved_keyframes;
     fields.Table(

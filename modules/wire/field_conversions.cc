@@ -82,6 +82,8 @@ Result<> ReadField(const rigid3_t& field, Rigid3& transform) {
 
 bool IsScale(double scale) { return scale > 1e-9 && scale < 1e9; }
 
+bool IsRadial(double radial) { return std::abs(radial) <= kMaxRadial; }
+
 void WriteField(const Sim3& transform, sim3_t& field) {
   rigid3_t pose;
   WriteField(transform.Pose(), pose);

@@ -103,6 +103,7 @@ Result<> ReadField(const rigid3_t& field, Rigid3& transform);
 void WriteField(const Sim3& transform, sim3_t& field);
 Result<> ReadField(const sim3_t& field, Sim3& transform);
 bool IsScale(double scale);
+bool IsRadial(double radial);  // of a lens
 
 // Both are checked as their Check() does.
 void WriteField(const CameraCalibration& calibration, camera_model_t& field);

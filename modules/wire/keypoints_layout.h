@@ -20,6 +20,8 @@ void DescribeKeypoints(Fields& fields, Message& message, Frame& frame, More... m
   fields.Time(message.utime, frame.utime_us);
   fields.Time(message.captured, frame.captured_us);
   fields(message.camera, frame.calibration);
+  fields(message.radial, frame.calibration.radial);
+  fields.Check(IsRadial(frame.calibration.radial), "its radial distortion is out of range");
   fields.Check(frame.frame.valid(), "its frame number is negative");
   auto& keypoints = frame.keypoints;
   fields.WholeTable(

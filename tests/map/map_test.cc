@@ -112,7 +112,7 @@ TEST(Map, TheHashCoversTheCamera) {
   }));
 }
 
-TEST(Map, FocalLengthsChangeInAllKeyframesAndInWhatIsMadeOfThem) {
+TEST(Map, TheLensChangesInAllKeyframesAndInWhatIsMadeOfThem) {
   SyntheticWorld world(SensorType::kMono);
   PlantedMap planted(world);
   for (int64_t k = 0; k < 3; ++k) planted.Add(k, {k - 1});
@@ -120,16 +120,17 @@ TEST(Map, FocalLengthsChangeInAllKeyframesAndInWhatIsMadeOfThem) {
   for (const MapDelta& delta : planted.deltas()) ASSERT_TRUE(replica.Apply(delta));
   const uint64_t before = replica.hash();
   MapEditor editor(planted.map());
-  editor.ChangeFocal({490.0, 480.0});
+  const LensCorrection lens{490.0, 480.0, -0.005};
+  editor.ChangeLens(lens);
   ASSERT_TRUE(replica.Apply(editor.Finish({2})));
   Map late;
   ASSERT_TRUE(late.Apply(replica.Snapshot()));
   EXPECT_NE(replica.hash(), before);
   for (const Map* map : {&planted.map(), &replica, &late}) {
     EXPECT_EQ(map->hash(), planted.map().hash());
-    EXPECT_EQ(map->focal(), (FocalLengths{490.0, 480.0}));
+    EXPECT_EQ(map->lens(), lens);
     map->keyframes().ForEach([&](KeyframeId, const Keyframe& keyframe) {
-      EXPECT_EQ(keyframe.features->calibration, WithFocal(world.calibration(), {490.0, 480.0}));
+      EXPECT_EQ(keyframe.features->calibration, WithLens(world.calibration(), lens));
     });
   }
 }

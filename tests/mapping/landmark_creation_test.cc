@@ -119,9 +119,9 @@ TEST(CreateFromPairs, OnlyParallaxThatStandsOutOfTheNoiseIsTakenAtItsWord) {
 // What is systematically wrong in images grows with the way of a keypoint through them.
 TEST(CreateFromPairs, ATurnBetweenTheViewsCountsAsNoise) {
   PartlyKnownMap world(SensorType::kMono, {0, 3});
-  const double limit = 3.0 * world.Turn();
+  const double limit = 2.0 * world.Turn();
   int num_known = 0, num_nearer = 0;
-  for (const LandmarkId id : world.Run(CreateFromPairs, {.matching = {.min_parallax_per_turn = 3.0}})) {
+  for (const LandmarkId id : world.Run(CreateFromPairs, {.matching = {.min_parallax_per_turn = 2.0}})) {
     const double share = (world.Position(id) - world.Center()).norm() / (world.Truth(id) - world.Center()).norm();
     if (world.Parallax(id) >= limit) {
       EXPECT_NEAR(share, 1.0, 0.01);

@@ -26,8 +26,9 @@ FeatureFrame FrameOf(SensorType sensor, uint8_t level = 0) {
 }
 
 TEST(KeypointMeasurement, TheNoiseGrowsWithThePyramidLevel) {
-  EXPECT_DOUBLE_EQ(SeenAt(FrameOf(SensorType::kMono, 0), 0).sigma_px, kKeypointSigmaPx);
-  EXPECT_NEAR(SeenAt(FrameOf(SensorType::kMono, 3), 0).sigma_px, kKeypointSigmaPx * 1.2 * 1.2 * 1.2, 1e-12);
+  EXPECT_DOUBLE_EQ(SeenAt(FrameOf(SensorType::kMono, 0), 0).sigma_px, KeypointSigmaPx(SensorType::kMono));
+  EXPECT_NEAR(SeenAt(FrameOf(SensorType::kMono, 3), 0).sigma_px, KeypointSigmaPx(SensorType::kMono) * 1.2 * 1.2 * 1.2,
+              1e-12);
 }
 
 TEST(KeypointMeasurement, DepthIsCarriedAsARightColumn) {

@@ -68,7 +68,7 @@ class SeenLandmark {
 // Two pairs of cameras, a baseline apart, see the depth of a point between them up to  z^2 / (f baseline) sigma_px.
 TEST(DepthSigma, IsThatOfATriangulation) {
   const Eigen::Vector3d left(-0.5, 0, 0), right(0.5, 0, 0);
-  const double expected = 10.0 * 10.0 / (500.0 * 1.0) * kKeypointSigmaPx;
+  const double expected = 10.0 * 10.0 / (500.0 * 1.0) * KeypointSigmaPx(SensorType::kMono);
   EXPECT_NEAR(SeenLandmark({left, right, left, right}).DepthSigma() / expected, 1.0, 0.01);
 }
 

@@ -306,7 +306,7 @@ Landmark DrawLandmark(std::mt19937& generator) {
 // Keyframes, landmarks, observations and loops: what a snapshot is made of.
 MapDelta DrawContent(std::mt19937& generator, int size) {
   MapDelta delta{.number = Draw(generator, 0, 99), .answers = {Draw(generator, -1, 99)}, .hash = generator()};
-  if (size > 0) delta.focal = {DrawReal(generator, 1, 999), DrawReal(generator, 1, 999)};
+  if (size > 0) delta.lens = {DrawReal(generator, 1, 999), DrawReal(generator, 1, 999), -0.0123};
   for (int i = 0; i < 3 * size; ++i) {
     auto features = std::make_shared<FeatureFrame>(DrawValue<FeatureFrame>(generator, i % 2));
     delta.new_keyframes.push_back(
@@ -354,7 +354,7 @@ MapDelta DrawValue<MapDelta>(std::mt19937& generator, int size) {
 template <>
 bool AreSame(const MapDelta& a, const MapDelta& b) {
   return a.number == b.number && a.answers == b.answers && a.is_snapshot == b.is_snapshot && a.hash == b.hash &&
-         a.asks_adjustment == b.asks_adjustment && a.focal == b.focal && a.closed_loops == b.closed_loops &&
+         a.asks_adjustment == b.asks_adjustment && a.lens == b.lens && a.closed_loops == b.closed_loops &&
          AreSameLists(a.new_keyframes, b.new_keyframes, AreSameKeyframe) &&
          AreSameLists(a.moved_keyframes, b.moved_keyframes,
                       [](const auto& x, const auto& y) {

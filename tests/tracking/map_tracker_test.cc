@@ -89,7 +89,7 @@ TEST(MapTracker, InliersAreSomeOfTheMatches) {
 
 TEST(MapTracker, KeyframesOfASteadyCameraSayWhereItWasExpectedWhereImagesLeaveItOpen) {
   Outcome outcome;
-  Follow(SyntheticWorld(SensorType::kMono, 0.3, 500), 80, 3, {}, outcome);
+  Follow(SyntheticWorld(SensorType::kMono, 0.35, 500), 80, 3, {}, outcome);
   ASSERT_FALSE(outcome.keyframes.empty());
   EXPECT_FALSE(outcome.keyframes.front().expected.is_known()) << "nothing was seen of its motion yet";
   int num_known = 0;

@@ -224,11 +224,11 @@ TEST(TrackerSession, AMapOfAnotherCameraIsRefusedForGood) {
   EXPECT_TRUE(stack.poses.empty());
 }
 
-TEST(TrackerSession, AMapOfOtherFocalLengthsFitsTheCameraThatItCorrectsAndNoOther) {
+TEST(TrackerSession, AMapOfAnotherLensFitsTheCameraThatItCorrectsAndNoOther) {
   Map map;
   ASSERT_TRUE(map.Apply(*SavedMap()));
   MapEditor editor(map);
-  editor.ChangeFocal({490.0, 490.0});
+  editor.ChangeLens({490.0, 490.0, 0.01});
   (void)editor.Finish(map.answered());
   for (const double fx_px : {500.0, 600.0}) {
     Stack stack(Logical(), true);

@@ -14,8 +14,9 @@ import numpy as np
 from PIL import Image
 
 from tessera_cli.files import replacing, write_text
+from tessera_cli.maps.camera_model import CameraModel
 from tessera_cli.maps.landmark_colors import UNKNOWN, colors_at
-from tessera_cli.maps.map_replica import CameraModel, Keyframe, MapReplica
+from tessera_cli.maps.map_replica import Keyframe, MapReplica
 from tessera_cli.maps.poses import conjugate, rotate, rotation_matrices
 from tessera_cli.runs.recorded_images import best_images
 
@@ -94,7 +95,7 @@ def write_images(model: Model, folder: Path, log: Path, channel_prefix: str) -> 
         with replacing(folder / image_name(keyframe)) as written:
             Image.fromarray(image).save(written)
         rows = np.flatnonzero(firsts[:, 0] == number)
-        colors[rows] = colors_at(keyframe.keypoints[firsts[rows, 1]], image)
+        colors[rows] = colors_at(keyframe.camera.seen(keyframe.keypoints[firsts[rows, 1]]), image)
     return colors
 
 
@@ -104,10 +105,23 @@ def _rotation(keyframe: Keyframe) -> np.ndarray:
 
 
 def _camera_rows(model: Model) -> Iterator[str]:
-    yield "# CAMERA_ID MODEL WIDTH HEIGHT fx fy cx cy\n"
+    yield "# CAMERA_ID MODEL WIDTH HEIGHT fx fy cx cy, of OPENCV also k1 k2 p1 p2\n"
     for index, camera in enumerate(model.cameras):
-        center = f"{camera.cx + HALF_PIXEL:.9g} {camera.cy + HALF_PIXEL:.9g}"
-        yield f"{index + 1} PINHOLE {camera.width} {camera.height} {camera.fx:.9g} {camera.fy:.9g} {center}\n"
+        numbers = [camera.fx, camera.fy, camera.cx + HALF_PIXEL, camera.cy + HALF_PIXEL, *_distortion(camera)]
+        row = " ".join(f"{number:.9g}" for number in numbers)
+        name = "OPENCV" if camera.radial else "PINHOLE"
+        yield f"{index + 1} {name} {camera.width} {camera.height} {row}\n"
+
+
+def _distortion(camera: CameraModel) -> tuple[float, ...]:
+    """k1 k2 p1 p2 of images as the camera sees them; nothing where it sees as a pinhole does.
+
+    CameraModel's correction, moved = (1 + a r^2) seen in units of the focal length, solved for `seen`:
+
+        seen = (1 - a r^2 + 3 a^2 r^4 - ...) moved
+    """
+    a = camera.radial * (camera.fx / (0.5 * camera.width)) ** 2
+    return (-a, 3.0 * a**2, 0.0, 0.0) if a else ()
 
 
 def _image_rows(model: Model) -> Iterator[str]:
@@ -122,7 +136,7 @@ def _image_rows(model: Model) -> Iterator[str]:
         yield f"{number + 1} {pose} {camera} {image_name(keyframe)}\n"
         known = np.minimum(keyframe.landmarks, len(has_point) - 1)
         points = np.where(has_point[known] & (keyframe.landmarks >= 0), keyframe.landmarks + 1, -1)
-        pixels = keyframe.keypoints.astype(float) + HALF_PIXEL
+        pixels = keyframe.camera.seen(keyframe.keypoints) + HALF_PIXEL
         yield " ".join(f"{x:.8g} {y:.8g} {point}" for (x, y), point in zip(pixels.tolist(), points.tolist())) + "\n"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tessera_cli.maps.map_replica import CameraModel
+from tessera_cli.maps.camera_model import CameraModel
 from tessera_cli.maps.occupancy_file import Grid
 
 MAP, WORLD, CAMERA = "map", "world", "camera"

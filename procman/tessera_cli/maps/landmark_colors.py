@@ -52,7 +52,8 @@ class LandmarkColors:
         """N x 3 bytes of the landmarks, in the order of their numbers; None: none is known."""
         for number, keyframe in replica.keyframes.items():
             if self._waiting and keyframe.frame in self._waiting:
-                self._at_keypoints[number] = colors_at(keyframe.keypoints, self._waiting.pop(keyframe.frame))
+                pixels = keyframe.camera.seen(keyframe.keypoints)
+                self._at_keypoints[number] = colors_at(pixels, self._waiting.pop(keyframe.frame))
         known = self._at_keypoints.keys() & replica.keyframes.keys()
         if not known:
             return None

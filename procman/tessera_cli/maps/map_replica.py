@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tessera_cli.maps.camera_model import CameraModel
 from tessera_cli.maps.poses import conjugate, multiply, rotate
 
 # More landmarks than any map has: a number beyond is damage.
@@ -22,25 +23,6 @@ class MapError(Exception):
     """A change does not fit the map."""
 
 
-@dataclass(frozen=True)
-class CameraModel:
-    """A rectified pinhole camera; x right, y down, z forward; pixel (0, 0) is the center of the top left pixel."""
-
-    width: int
-    height: int
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    is_mono: bool = True
-
-    @classmethod
-    def of(cls, message: Any) -> "CameraModel":
-        """Of a camera_model_t."""
-        numbers = (message.fx, message.fy, message.cx, message.cy)
-        return cls(message.width, message.height, *numbers, is_mono=message.sensor == message.MONO)
-
-
 @dataclass
 class Keyframe:
     parent: int  # -1: none
@@ -50,7 +32,7 @@ class Keyframe:
     frame: int
     utime_us: int
     camera: CameraModel
-    keypoints: np.ndarray  # n x 2, px
+    keypoints: np.ndarray  # n x 2, px, as the camera model has them
     levels: np.ndarray  # n, of the pyramid
     landmarks: np.ndarray  # n: number of the landmark that the keypoint shows; -1: none
 
@@ -113,6 +95,8 @@ class MapReplica:
 
     def apply(self, change: Any) -> None:
         """A map_change_t as `decode_arrays` gives it. Parts of one change are applied one after another."""
+        if change.fx:
+            self._change_lens(change.fx, change.fy, change.radial)
         for added in change.new_keyframes:
             self._add_keyframe(added)
         moved = zip(change.moved_keyframes.tolist(), change.world_from_camera, change.scale.tolist())
@@ -138,6 +122,13 @@ class MapReplica:
             raise MapError(f"keyframe {number} is not in the map")
         return keyframe
 
+    def _change_lens(self, fx: float, fy: float, radial: float) -> None:
+        for keyframe in self.keyframes.values():
+            camera = keyframe.camera.with_lens(fx, fy, radial)
+            if camera.radial != keyframe.camera.radial:
+                keyframe.keypoints = camera.moved(keyframe.camera.seen(keyframe.keypoints)).astype(np.float32)
+            keyframe.camera = camera
+
     def _add_keyframe(self, added: Any) -> None:
         """A map_keyframe_t: a keyframe, or more of its keypoints."""
         keypoints = added.keypoints
@@ -154,7 +145,7 @@ class MapReplica:
                 scale=added.scale,
                 frame=keypoints.frame,
                 utime_us=keypoints.utime,
-                camera=CameraModel.of(keypoints.camera),
+                camera=CameraModel.of(keypoints.camera, keypoints.radial),
                 keypoints=np.zeros((total, 2), np.float32),
                 levels=np.zeros(total, np.uint8),
                 landmarks=np.full(total, -1),

@@ -31,7 +31,7 @@ def headline(result: Result) -> list[str]:
         _speed(result),
         _loops(result),
         _drift(result),
-        _focal(result),
+        _lens(result),
         _failures(result),
     ]
     return [sentence for sentence in sentences if sentence]
@@ -95,12 +95,16 @@ def _drift(result: Result) -> str:
     )
 
 
-def _focal(result: Result) -> str:
-    error = (result.summary.get("stage_values") or {}).get("mapper", {}).get("focal_error")
+def _lens(result: Result) -> str:
+    values = (result.summary.get("stage_values") or {}).get("mapper", {})
+    error, radial = values.get("focal_error"), values.get("lens_radial")
     if not error:
         return ""
+    edges = (
+        f" and edges of the image drawn {100 * abs(radial):.1f} % {'out' if radial > 0 else 'in'}ward" if radial else ""
+    )
     return (
-        f"Focal lengths {focal_words(error)} than the calibration's explain the images better, and were used: "
+        f"Focal lengths {focal_words(error)} than the calibration's{edges} explain the images better, and were used: "
         "calibrate the camera anew."
     )
 

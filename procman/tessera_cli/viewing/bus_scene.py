@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from tessera_cli.maps.camera_model import CameraModel
 from tessera_cli.maps.landmark_colors import LandmarkColors
 from tessera_cli.maps.map_follower import MapFollower, PartJoiner
-from tessera_cli.maps.map_replica import CameraModel
 from tessera_cli.messages import pose_t
 from tessera_cli.runs.recorded_images import LeftImages, to_jpeg
 from tessera_cli.viewing import keypoints, map_shapes

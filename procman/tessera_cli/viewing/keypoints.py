@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tessera_cli.maps.map_replica import CameraModel, Keyframe, MapReplica
+from tessera_cli.maps.camera_model import CameraModel
+from tessera_cli.maps.map_replica import Keyframe, MapReplica
 from tessera_cli.maps.poses import rotation_matrices
 from tessera_cli.viewing.scene import BLUE, GREEN, LOST, NEW, RED, TRACKED, Moment, Points, PointSeries, Shown
 

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tessera_cli.maps.map_replica import CameraModel
+from tessera_cli.maps.camera_model import CameraModel
 
 Color: TypeAlias = tuple[int, int, int]
 

@@ -47,6 +47,19 @@ def test_keyframes_move_and_landmarks_change() -> None:
     assert is_close(replica.positions[3], [9, 0, 5])
 
 
+def test_another_lens_moves_keypoints_there_and_back() -> None:
+    before = two_views()
+    other = make_change()
+    other.fx, other.fy, other.radial = 490.0, 480.0, -0.01
+    replica = replica_of(before, other)
+    camera = replica.keyframes[0].camera
+    assert (camera.fx, camera.fy, camera.radial) == (490.0, 480.0, -0.01)
+    # At (320, 240) is the center, nothing moves there; (10, 10) lies 1.225 half widths away.
+    assert is_close(replica.keyframes[0].keypoints[0], [320, 240])
+    assert np.abs(replica.keyframes[0].keypoints[1] - [14.65, 13.45]).max() < 0.02
+    assert np.abs(camera.seen(replica.keyframes[0].keypoints) - [[320, 240], [10, 10]]).max() < 1e-4
+
+
 def test_observations_landmarks_and_keyframes_go() -> None:
     removal = make_change(
         removed_observations=[make_observation(3, 1, 0), make_observation(5, 1, 1)],

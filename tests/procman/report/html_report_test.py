@@ -155,6 +155,12 @@ def test_other_focal_lengths_than_the_calibration_s_are_told(tmp_path: Path) -> 
         folder = write_run(tmp_path / f"{error}", sensor="mono", stage_values={"mapper": {"focal_error": error}})
         told = [sentence for sentence in headline(read_run(folder)) if "ocal lengths" in sentence]
         assert len(told) == bool(words) and (not told or words in told[0])
+    folder = write_run(
+        tmp_path / "lens", sensor="mono", stage_values={"mapper": {"focal_error": -0.008, "lens_radial": -0.0062}}
+    )
+    assert "0.8 % shorter than the calibration's and edges of the image drawn 0.6 % inward" in " ".join(
+        headline(read_run(folder))
+    )
 
 
 def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:

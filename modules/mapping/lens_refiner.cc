@@ -1,4 +1,4 @@
-#include "mapping/focal_refiner.h"
+#include "mapping/lens_refiner.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,10 +19,11 @@ constexpr size_t kMinKeyframes = 20;
 constexpr size_t kMinObservers = 3;   // of those, of a landmark
 constexpr int64_t kMinInterval = 10;  // keyframes between looks; twice as many after each that finds no error
 constexpr int64_t kMaxInterval = 80;
-constexpr double kMinTurn_rad = 0.6;     // in all, of the keyframes
-constexpr double kMinError = 0.005;      // of a focal length, to be worth a change
-constexpr double kMinSigmas = 5.0;       // and beyond doubt
-constexpr double kMaxSigmasApart = 3.0;  // two looks
+constexpr double kMinTurn_rad = 0.6;      // in all, of the keyframes
+constexpr double kMinError = 0.005;       // of a focal length, to be worth a change
+constexpr double kMinErrorLeft = 0.0025;  // likewise, of a calibration that is known to be wrong
+constexpr double kMinSigmas = 5.0;        // and beyond doubt
+constexpr double kMaxSigmasApart = 3.0;   // two looks
 
 // The newest keyframes of the newest part of the map.
 std::vector<KeyframeId> NewestKeyframes(const Map& map) {
@@ -71,42 +72,49 @@ BundleProblem ProblemOf(const Map& map, const std::vector<KeyframeId>& keyframes
   return problem;
 }
 
-bool IsError(const FocalEstimate& estimate) {
-  return std::abs(estimate.error) >= std::max(kMinError, kMinSigmas * estimate.sigma);
+bool IsError(const FocalEstimate& estimate, double min_error) {
+  return std::abs(estimate.error) >= std::max(min_error, kMinSigmas * estimate.sigma);
 }
 
 }  // namespace
 
-bool FocalRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor) {
+bool LensRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEditor& editor) {
   const Map& map = editor.map();
-  error_ = FocalError(map.focal(), given);
+  error_ = FocalError(map.lens(), given);
   if (given.sensor != SensorType::kMono || next < next_look_ || map.FindKeyframe(map.answered()) == nullptr)
     return false;
   const std::vector<KeyframeId> keyframes = NewestKeyframes(map);
   next_look_ = {next.value + kMinInterval};
   if (keyframes.size() < kMinKeyframes || TurnOf(map, keyframes) < kMinTurn_rad) return false;
-  const std::optional<FocalEstimate> found = EstimateFocal(ProblemOf(map, keyframes, max_landmarks_));
-  const bool is_error = found && IsError(*found);
+  const BundleProblem problem = ProblemOf(map, keyframes, max_landmarks_);
+  const std::optional<FocalEstimate> found = EstimateFocal(problem);
+  const bool is_error = found && IsError(*found, map.lens().is_known() ? kMinErrorLeft : kMinError);
   interval_ = is_error ? kMinInterval : std::clamp(2 * interval_, kMinInterval, kMaxInterval);
   next_look_ = {next.value + interval_};
   const std::optional<FocalEstimate> before = std::exchange(before_, is_error ? found : std::nullopt);
   if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return false;
-  const FocalLengths focal = ScaledFocal(WithFocal(given, map.focal()), found->error);
-  const double total = FocalError(focal, given);
-  const bool is_plausible = std::abs(total) <= kMaxFocalError;
+  // Beyond what a calibration can be wrong by, something else is: a distortion that was never looked at.
+  const CameraCalibration current = WithLens(given, map.lens());
+  const std::optional<LensError> error = EstimateLens(problem, {error_, current.radial});
+  if (!error) return false;
+  const double total = FocalError(CorrectedBy({found->error, 0.0}, current), given);
+  const double focal = FocalError(CorrectedBy(*error, current), given);
+  const bool is_plausible = std::abs(total) <= kMaxFocalError && std::abs(focal) <= kMaxFocalError &&
+                            std::abs(current.radial + error->radial) <= kMaxRadial;
   if (!is_plausible) doubt_ = total;
-  if (!is_plausible || !Change(focal, keyframes, editor)) return false;
-  error_ = total;
+  if (!is_plausible || !Change(*error, keyframes, editor)) return false;
+  error_ = focal;
   return true;
 }
 
-bool FocalRefiner::Change(const FocalLengths& focal, const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
+bool LensRefiner::Change(const LensError& error, const std::vector<KeyframeId>& keyframes, MapEditor& editor) {
   BundleProblem problem = ProblemOf(editor.map(), keyframes, std::numeric_limits<size_t>::max());
-  problem.calibration = WithFocal(problem.calibration, focal);
+  const LensCorrection lens = CorrectedBy(error, problem.calibration);
+  problem = WithLensError(std::move(problem), error);
   const std::optional<BundleResult> adjusted = AdjustBundle(problem, GlobalBundleOptions());
   if (!adjusted) return false;
   before_.reset();
-  editor.ChangeFocal(focal);
+  editor.ChangeLens(lens);
   WriteBack(problem, *adjusted, editor);
   return true;
 }

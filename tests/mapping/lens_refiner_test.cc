@@ -1,4 +1,4 @@
-#include "mapping/focal_refiner.h"
+#include "mapping/lens_refiner.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ class MiscalibratedMap {
  public:
   MiscalibratedMap(SensorType sensor, double error, int64_t num_keyframes = 40)
       : world_(sensor, 0.3, 6000), planted_(world_), given_(world_.calibration()) {
-    given_ = WithFocal(given_, {given_.fx_px * (1.0 + error), given_.fy_px * (1.0 + error)});
+    given_ = WithLens(given_, {given_.fx_px * (1.0 + error), given_.fy_px * (1.0 + error)});
     for (int64_t k = 0; k < num_keyframes; ++k) {
       planted_.Add(2 * k, {k - 1}, 0, {}, [&](FeatureFrame& features) { features.calibration = given_; });
     }
@@ -30,7 +30,7 @@ class MiscalibratedMap {
 
   // What another refiner says of the map, as one does that was loaded.
   double ErrorOfLoadedMap() {
-    FocalRefiner later;
+    LensRefiner later;
     MapEditor editor(planted_.map());
     later.Refine({0}, given_, editor);
     return later.error();
@@ -38,27 +38,28 @@ class MiscalibratedMap {
 
   double true_fx() const { return world_.calibration().fx_px; }
   PlantedMap& planted() { return planted_; }
-  const FocalRefiner& refiner() const { return refiner_; }
+  const LensRefiner& refiner() const { return refiner_; }
   const MapDelta& delta() const { return delta_; }
 
  private:
   SyntheticWorld world_;
   PlantedMap planted_;
   CameraCalibration given_;
-  FocalRefiner refiner_{6000};  // each keyframe turns by little
+  LensRefiner refiner_{6000};  // each keyframe turns by little
   int64_t next_ = 0;
   MapDelta delta_;
 };
 
-TEST(FocalRefiner, CorrectsWhatTwoLooksAgreeOn) {
+TEST(LensRefiner, CorrectsWhatTwoLooksAgreeOn) {
   MiscalibratedMap miscalibrated(SensorType::kMono, 0.02);
   Map replica;
   for (const MapDelta& delta : miscalibrated.planted().deltas()) ASSERT_TRUE(replica.Apply(delta));
-  EXPECT_FALSE(miscalibrated.Look(1).focal().is_known());
+  EXPECT_FALSE(miscalibrated.Look(1).lens().is_known());
   ASSERT_TRUE(replica.Apply(miscalibrated.delta()));
   const Map& map = miscalibrated.Look(1);
-  ASSERT_TRUE(map.focal().is_known());
-  EXPECT_NEAR(map.focal().fx_px, miscalibrated.true_fx(), 0.004 * miscalibrated.true_fx());
+  ASSERT_TRUE(map.lens().is_known());
+  EXPECT_NEAR(map.lens().fx_px, miscalibrated.true_fx(), 0.004 * miscalibrated.true_fx());
+  EXPECT_NEAR(map.lens().radial, 0.0, 0.001);
   EXPECT_NEAR(miscalibrated.refiner().error(), 1.0 / 1.02 - 1.0, 0.004);
   EXPECT_EQ(miscalibrated.refiner().doubt(), 0.0);
   EXPECT_EQ(miscalibrated.ErrorOfLoadedMap(), miscalibrated.refiner().error());
@@ -67,23 +68,23 @@ TEST(FocalRefiner, CorrectsWhatTwoLooksAgreeOn) {
   EXPECT_EQ(replica.Sha256Hex(), map.Sha256Hex());
 }
 
-TEST(FocalRefiner, LeavesARightCalibrationAlone) {
+TEST(LensRefiner, LeavesARightCalibrationAlone) {
   MiscalibratedMap right(SensorType::kMono, 0.0);
   const uint64_t before = right.planted().map().hash();
   EXPECT_EQ(right.Look(2).hash(), before);
   EXPECT_EQ(right.refiner().error(), 0.0);
 }
 
-TEST(FocalRefiner, DoubtsWhatNoCalibrationIsWrongBy) {
+TEST(LensRefiner, DoubtsWhatNoCalibrationIsWrongBy) {
   MiscalibratedMap far(SensorType::kMono, 0.06);
-  EXPECT_FALSE(far.Look(2).focal().is_known());
+  EXPECT_FALSE(far.Look(2).lens().is_known());
   EXPECT_LT(far.refiner().doubt(), -0.03);
 }
 
-TEST(FocalRefiner, NeedsATurnAndAMonoCamera) {
+TEST(LensRefiner, NeedsATurnAndAMonoCamera) {
   MiscalibratedMap straight(SensorType::kMono, 0.02, 22), stereo(SensorType::kStereo, 0.02);
-  EXPECT_FALSE(straight.Look(2).focal().is_known());
-  EXPECT_FALSE(stereo.Look(2).focal().is_known());
+  EXPECT_FALSE(straight.Look(2).lens().is_known());
+  EXPECT_FALSE(stereo.Look(2).lens().is_known());
 }
 
 }  // namespace
