@@ -125,3 +125,22 @@ def test_colmap_reads_the_model_back(tmp_path: Path) -> None:
     image = read.images[2]
     assert is_close(image.projection_center(), [0.5, 0, 0])
     assert is_close(image.points2D[0].xy, [270.5, 240.5]), "pixels are counted from the corner"
+
+
+def test_colmap_s_cameras_have_the_distortion_that_the_mapper_found(tmp_path: Path) -> None:
+    replica = made_replica()
+    other = make_change()
+    other.fx, other.fy, other.radial = 490.0, 490.0, -0.01
+    replica.apply(make_delta(1, other).change)
+    write_model(model_of(replica), tmp_path, None)
+    name, *numbers = (tmp_path / "cameras.txt").read_text().splitlines()[1].split()[1:]
+    fx, fy, cx, cy, k1, k2, p1, p2 = (float(number) for number in numbers[2:])
+    assert (name, fx, fy, p1, p2) == ("OPENCV", 490, 490, 0, 0)
+    # A pinhole's pixels of the corrected image, and where COLMAP's formula puts them in the camera's.
+    corrected = np.array([[5.0, 5.0], [600.0, 400.0], [320.0, 239.0]])
+    x = (corrected + 0.5 - [cx, cy]) / [fx, fy]
+    squares = (x**2).sum(axis=1, keepdims=True)
+    expected = x * (1 + k1 * squares + k2 * squares**2) * [fx, fy] + [cx, cy] - 0.5
+    assert np.abs(replica.keyframes[0].camera.seen(corrected) - expected).max() < 0.02
+    first = (tmp_path / "images.txt").read_text().splitlines()[2].split()
+    assert is_close([float(first[3]), float(first[4])], [10.5, 10.5]), "keypoints stand in the camera's image"
