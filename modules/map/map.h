@@ -58,7 +58,7 @@ struct CovisibleKeyframe {
   bool operator==(const CovisibleKeyframe&) const = default;
 };
 
-// A keyframe in the map: its features never change, but for the focal lengths in their calibration (Map::focal); its
+// A keyframe in the map: its features never change, but for the lens that they were seen by (Map::lens); its
 // pose does.
 //
 // Closing a loop of mono changes the scale of the map, by another factor at each keyframe. What was measured relative

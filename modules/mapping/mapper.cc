@@ -70,8 +70,8 @@ Mapper::Mapper(const MapperOptions& options) : options_(options), keyframe_culle
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
-  const bool has_new_focal = RefineFocal(seen, editor);
-  is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_focal;
+  const bool has_new_lens = RefineLens(seen, editor);
+  is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_lens;
   Insert(seen, editor);
   RememberMotion(seen);
   ObserveLandmarks(seen, editor);
@@ -107,7 +107,7 @@ Result<> Mapper::Repeat(const KeyframeObservation& seen, const MapperStep& step)
   const MapDelta& delta = step.delta;
   if (delta.answers != seen.id) return Failed("it is a step of keyframe " + std::to_string(delta.answers.value));
   MapEditor before(map_);
-  RefineFocal(seen, before);  // which finds nothing, but counts its looks
+  RefineLens(seen, before);  // which finds nothing, but counts its looks
   TESSERA_RETURN_IF_FAILED(map_.Apply(delta));
   map_.RaiseEnd(step.end_landmark);
   RememberMotion(seen);
@@ -174,7 +174,7 @@ bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId n
 }
 
 // Poses move: what loops and an adjustment under way are measured against is gone.
-bool Mapper::RefineFocal(const KeyframeObservation& seen, MapEditor& editor) {
+bool Mapper::RefineLens(const KeyframeObservation& seen, MapEditor& editor) {
   const CameraCalibration& given = seen.features.calibration;
   if (!options_.refines_focal || !lens_refiner_.Refine(seen.id, given, editor)) return false;
   last_corrected_ = seen.id;

@@ -34,7 +34,7 @@ struct MapperOptions {
   LoopFusionOptions loop_fusion;
   // How many keyframes are mapped with caution after one whose way the images leave open (Mapper).
   int num_cautious_keyframes = 25;
-  // Mono: the focal lengths are those that explain the map best, where they clearly differ from the calibration's.
+  // Mono: focal lengths and distortion are those that explain the map best, where the calibration's clearly don't.
   bool refines_focal = true;
   bool polishes = false;  // Finish() asks for a last global adjustment, of every part of the map, also without loops
 
@@ -80,7 +80,7 @@ class Mapper {
   bool ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor);
   bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
-  bool RefineFocal(const KeyframeObservation& seen, MapEditor& editor);
+  bool RefineLens(const KeyframeObservation& seen, MapEditor& editor);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void RememberMotion(const KeyframeObservation& seen);
