@@ -22,7 +22,8 @@ BundleOptions OneRound() {
 // Of the area around a pixel that MovedByLens moves, as a length: how much longer it is thereafter.
 double Magnification(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d from_center = pixel - Eigen::Vector2d(calibration.cx_px, calibration.cy_px);
-  const double moved_by = radial * from_center.squaredNorm() / std::pow(0.5 * calibration.width_px, 2);
+  const double half_width_px = 0.5 * calibration.width_px;
+  const double moved_by = radial * from_center.squaredNorm() / (half_width_px * half_width_px);
   return std::sqrt((1.0 + moved_by) * (1.0 + 3.0 * moved_by));
 }
 
@@ -86,7 +87,7 @@ std::optional<LensError> EstimateLens(const BundleProblem& problem, const LensEr
                   .toDenseMatrix();
   const Eigen::Vector2d slope(focal.slope / kImagesVariance + known.focal / (kFocalSigma * kFocalSigma),
                               radial.slope / kImagesVariance + known.radial / (kRadialSigma * kRadialSigma));
-  if (!(curvature.determinant() > 0.0)) return std::nullopt;
+  if (!(curvature(0, 0) > 0.0 && curvature.determinant() > 0.0)) return std::nullopt;
   const Eigen::Vector2d error = -curvature.inverse() * slope;
   return LensError{error.x(), error.y()};
 }
