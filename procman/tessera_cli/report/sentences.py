@@ -101,7 +101,9 @@ def _lens(result: Result) -> str:
     if not error:
         return ""
     edges = (
-        f" and edges of the image drawn {100 * abs(radial):.1f} % {'out' if radial > 0 else 'in'}ward" if radial else ""
+        f", and edges of the image drawn {100 * abs(radial):.1f} % {'out' if radial > 0 else 'in'}ward,"
+        if radial
+        else ""
     )
     return (
         f"Focal lengths {focal_words(error)} than the calibration's{edges} explain the images better, and were used: "

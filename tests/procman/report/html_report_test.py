@@ -158,7 +158,7 @@ def test_other_focal_lengths_than_the_calibration_s_are_told(tmp_path: Path) -> 
     folder = write_run(
         tmp_path / "lens", sensor="mono", stage_values={"mapper": {"focal_error": -0.008, "lens_radial": -0.0062}}
     )
-    assert "0.8 % shorter than the calibration's and edges of the image drawn 0.6 % inward" in " ".join(
+    assert "0.8 % shorter than the calibration's, and edges of the image drawn 0.6 % inward, explain" in " ".join(
         headline(read_run(folder))
     )
 
