@@ -17,6 +17,10 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr double kCell_px = 32.0;  // the width of a descriptor's patch on the finest level
 constexpr int kDegreesOfFreedom = 6;
 constexpr int kMinCells = 2 * kDegreesOfFreedom;
+// Of t in KeptVariance: below the first, hardly anything depends on it; beyond the last, no noise is cut off.
+constexpr double kLeastLimit = 1.0;
+constexpr double kGreatestLimit = 20.0;
+constexpr int kNumHalvings = 20;
 
 // What pose optimization makes of a point.
 struct Term {
@@ -65,6 +69,7 @@ std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame) {
   PoseInfluences influences;
   std::vector<Term> terms;
   std::vector<Eigen::Vector3d> residuals;
+  double sum_shares = 0.0, sum_freedom = 0.0;
   Matrix6d information = Matrix6d::Zero();
   for (size_t i = 0; i < frame.points.size(); ++i) {
     if (!frame.points[i].valid()) continue;
@@ -80,6 +85,8 @@ std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame) {
     information += term.Information();
     terms.push_back(term);
     residuals.push_back(at.residual);
+    sum_shares += at.residual.dot(term.weight * at.residual) / Chi2Limit(seen.has_right());
+    sum_freedom += seen.has_right() ? 3.0 : 2.0;
     const int column = std::clamp(static_cast<int>(seen.pixel_px.x() / kCell_px), 0, num_columns - 1);
     const int row = std::clamp(static_cast<int>(seen.pixel_px.y() / kCell_px), 0, num_rows - 1);
     const int cell = num_columns * row + column;
@@ -90,13 +97,31 @@ std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame) {
   const auto num_cells = static_cast<double>(std::count(is_covered.begin(), is_covered.end(), 1));
   const Eigen::LLT<Matrix6d> factor(BoundLeverage(information, terms));
   if (num_cells < kMinCells || factor.info() != Eigen::Success) return std::nullopt;
+  const auto num = static_cast<double>(terms.size());
+  const double kept = KeptVariance(sum_shares / num, sum_freedom / num);
   const Matrix6d moved_by_score =
-      -std::sqrt(num_cells / (num_cells - kDegreesOfFreedom)) * factor.solve(Matrix6d::Identity());
+      -std::sqrt(num_cells / (num_cells - kDegreesOfFreedom)) / kept * factor.solve(Matrix6d::Identity());
   if (!moved_by_score.allFinite()) return std::nullopt;
   for (size_t i = 0; i < terms.size(); ++i) {
     influences[i].moves_by = moved_by_score * (terms[i].by_pose.transpose() * (terms[i].weight * residuals[i]));
   }
   return influences;
+}
+
+double KeptVariance(double mean_share, double freedom) {
+  const double a = 0.5 * freedom;
+  const auto kept = [a](double t) {
+    double sum = 1.0, term = 1.0;
+    for (int j = 1; term > 1e-9 * sum; ++j) sum += term *= t / (a + j);
+    return 1.0 - 1.0 / sum;
+  };
+  // mean_share = a K(t) / t  falls as t grows.
+  double least = kLeastLimit, greatest = kGreatestLimit;
+  for (int i = 0; i < kNumHalvings; ++i) {
+    const double t = 0.5 * (least + greatest);
+    (a * kept(t) / t > mean_share ? least : greatest) = t;
+  }
+  return kept(least);
 }
 
 Matrix6d PoseCovariance(const PoseInfluences& influences) {

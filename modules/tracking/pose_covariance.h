@@ -20,13 +20,26 @@ struct PointInfluence {
 // Of delta in  world_from_camera * Exp(delta), (translation, rotation) in the camera's axes and units of the world,
 // against the points that the frame sees. To first order, point i moves the pose by
 //
-//   d_i = -H^-1 J_i' W_i r_i * sqrt(G / (G - 6)),   H = sum_i J_i' W_i J_i,   W_i = (I + D_i P_i D_i')^-1
+//   d_i = -H^-1 J_i' W_i r_i * sqrt(G / (G - 6)) / K,   H = sum_i J_i' W_i J_i,   W_i = (I + D_i P_i D_i')^-1
 //
 // r_i: the whitened residual, J_i and D_i: its derivatives by pose and point; P_i: the point's covariance, depth_sigma
-// along its normal; G: cells of the image, as wide as a patch, that hold a point. W_i and the bound on its leverage are
-// those of pose optimization, whose error this is. nullopt: fewer than 12 cells do, or they leave the pose open.
+// along its normal; G: cells of the image, as wide as a patch, that hold a point; K: see KeptVariance. W_i and the
+// bound on its leverage are those of pose optimization, whose error this is. nullopt: fewer than 12 cells do, or they
+// leave the pose open.
 using PoseInfluences = std::vector<PointInfluence>;
 std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame);
+
+// Points whose squared error is beyond a limit were taken out as outliers, and with them the tail of the noise. What is
+// left spreads less than the noise does, and holds the pose less than it seems to: a pose that moves finds other points
+// within the limit. Both by the same share K of the variance, so that the pose's variance is 1 / K^2 of what residuals
+// show (the asymptotic variance of a skipped mean: P. Huber, "Robust Statistics", 1981). Of Gaussian noise of variance
+// v in k dimensions, with t = limit / 2 v:
+//
+//   K = 1 - 1 / S(t),   S(t) = sum_j t^j / ((k/2 + 1) ... (k/2 + j)),   mean squared error = k v K
+//
+// `mean_share`: the mean squared error by the limit, which tells v; `freedom`: k. In (0, 1]; noise of which more than
+// two thirds are beyond the limit can't be told from outliers, and counts as that much.
+double KeptVariance(double mean_share, double freedom);
 
 // The residuals themselves say how noisy keypoints are, on whatever level and however wrong the points may be
 // ("sandwich": H. White, Econometrica 1980), and each cell counts as one observation, since one corner gives keypoints

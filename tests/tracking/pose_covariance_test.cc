@@ -18,7 +18,7 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr int kNumDraws = 120;
-constexpr double kNoise_px = 0.7 * KeypointSigmaPx(SensorType::kMono);  // what outliers are told by allows for more
+constexpr double kNoise_px = KeypointSigmaPx(SensorType::kMono);
 
 // Moves keypoints by noise of this size on their level; `num_alike` that follow one another stand at the same corner,
 // see the same point and err alike.
@@ -110,6 +110,21 @@ const double kBand = 1.96 * std::sqrt(2.0 * 6.0 / kNumDraws) + 0.6;
 TEST(PoseCovariance, IsConsistent) { EXPECT_NEAR(MeanNees(kNoise_px, 1), 6.0, kBand); }
 
 TEST(PoseCovariance, LearnsTheNoiseFromTheResiduals) { EXPECT_NEAR(MeanNees(0.1, 1), 6.0, kBand); }
+
+TEST(PoseCovariance, CountsTheNoiseThatWasTakenOutAsOutliers) {
+  EXPECT_NEAR(MeanNees(1.1 * kNoise_px, 1), 6.0, kBand);
+  EXPECT_NEAR(MeanNees(1.4 * kNoise_px, 1), 6.0, kBand);
+}
+
+// Of two dimensions, the integrals have a closed form:  K = 1 - t / (e^t - 1).
+TEST(PoseCovariance, KnowsWhatALimitLeavesOfTheNoise) {
+  for (const double t : {1.5, 3.0, 6.0}) {
+    const double kept = 1.0 - t / std::expm1(t);
+    EXPECT_NEAR(KeptVariance(kept / t, 2.0), kept, 1e-4);
+  }
+  EXPECT_NEAR(KeptVariance(1e-4, 3.0), 1.0, 1e-3) << "nothing is cut off";
+  EXPECT_NEAR(KeptVariance(0.5, 2.0), 1.0 - 1.0 / std::expm1(1.0), 1e-4) << "as much as can be told from outliers";
+}
 
 TEST(PoseCovariance, CountsKeypointsOfOneCornerOnce) { EXPECT_NEAR(MeanNees(kNoise_px, 4), 6.0, kBand); }
 
