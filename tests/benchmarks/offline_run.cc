@@ -50,24 +50,48 @@ Rigid3 Mirrored(const Rigid3& pose) {
   return {Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()), {-t.x(), t.y(), t.z()}};
 }
 
+// Numbers the frames from 0 on, in their order, or the last one first. Truth of other frames goes.
+void Renumber(bool is_reversed, FeatureSequence& sequence) {
+  if (sequence.frames.empty()) return;
+  const int64_t first_and_last_us = sequence.frames.front().utime_us + sequence.frames.back().utime_us;
+  if (is_reversed) std::ranges::reverse(sequence.frames);
+  std::map<FrameId, FrameId> number_of;
+  for (FeatureFrame& frame : sequence.frames) {
+    const FrameId number{static_cast<int64_t>(number_of.size())};
+    number_of[frame.frame] = number;
+    frame.frame = number;
+    if (is_reversed) frame.utime_us = first_and_last_us - frame.utime_us;
+  }
+  std::erase_if(sequence.ground_truth, [&](const GroundTruthPose& pose) { return !number_of.contains(pose.frame); });
+  if (is_reversed) std::ranges::reverse(sequence.ground_truth);
+  for (GroundTruthPose& pose : sequence.ground_truth) {
+    pose.frame = number_of.at(pose.frame);
+    if (is_reversed) pose.utime_us = first_and_last_us - pose.utime_us;
+  }
+}
+
 }  // namespace
 
-FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptions& feature_options, bool is_mirrored) {
+FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptions& feature_options,
+                                const Variation& variation) {
   const auto source = OpenSource(options);
   FeatureSequence sequence{source->calibration(), {}, source->ground_truth(), {}, {}};
-  if (is_mirrored) {
+  if (variation.step < 1) throw InputError("step must be at least 1");
+  if (variation.is_mirrored) {
     if (options.sensor != SensorType::kMono) throw InputError("only mono sequences can be mirrored");
     sequence.calibration.cx_px = sequence.calibration.width_px - 1 - sequence.calibration.cx_px;
     for (GroundTruthPose& pose : sequence.ground_truth) pose.world_from_camera = Mirrored(pose.world_from_camera);
   }
   Extractor extractor;
-  while (auto frame = source->Next()) {
-    if (is_mirrored) MirrorImage(frame->left);
+  for (int64_t i = 0; auto frame = source->Next(); ++i) {
+    if (i % variation.step != 0) continue;
+    if (variation.is_mirrored) MirrorImage(frame->left);
     int64_t& num_corners = sequence.num_corners.emplace_back();
     sequence.frames.push_back(Measure(sequence.extract_ms, [&] {
       return ExtractFrame(*frame, sequence.calibration, feature_options, extractor, &num_corners);
     }));
   }
+  if (variation.is_reversed || variation.step > 1) Renumber(variation.is_reversed, sequence);
   return sequence;
 }
 

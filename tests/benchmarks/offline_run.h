@@ -24,9 +24,16 @@ struct FeatureSequence {
   std::vector<int64_t> num_corners;  // by frame: candidates before the selection
 };
 
-// Reads and extracts. `is_mirrored` (mono only) swaps left and right in images and truth: a sequence of its own,
-// equally hard. Throws InputError as OpenSource does.
-FeatureSequence ExtractSequence(const SourceOptions& source, const FeatureOptions& options, bool is_mirrored);
+// What makes the same images a sequence of its own.
+struct Variation {
+  bool is_mirrored = false;  // mono only: left and right are swapped, in images and truth
+  bool is_reversed = false;  // the last image comes first, as long before the next as it came after it
+  int64_t step = 1;          // only each step-th image
+};
+
+// Reads and extracts. Throws InputError as OpenSource does, or if there can be no such variation.
+FeatureSequence ExtractSequence(const SourceOptions& source, const FeatureOptions& options,
+                                const Variation& variation = {});
 
 struct OfflineRun {
   explicit OfflineRun(const MapperOptions& options) : mapper(options) {}

@@ -2,7 +2,7 @@
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0]
-//   [min_focal=0] [vocabulary=FILE]
+//   [reverse=0] [step=1] [min_focal=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
 // With several delays, the sequence is played once with each; the spread tells what chance alone does to the errors.
@@ -29,7 +29,7 @@ struct Arguments {
   SourceOptions source;
   FeatureOptions features;
   std::vector<int64_t> map_delays{3};  // frames
-  bool is_mirrored = false;
+  Variation variation;
   std::string vocabulary;
 };
 
@@ -65,7 +65,11 @@ Arguments ParseArguments(int argc, char** argv) {
     else if (key == "features")
       arguments.features.num_features = static_cast<int>(value);
     else if (key == "mirror")
-      arguments.is_mirrored = value != 0;
+      arguments.variation.is_mirrored = value != 0;
+    else if (key == "reverse")
+      arguments.variation.is_reversed = value != 0;
+    else if (key == "step")
+      arguments.variation.step = value;
     else
       throw InputError("unknown argument `" + key + "`");
   }
@@ -194,13 +198,13 @@ int main(int argc, char** argv) {
   if (argc < 4) {
     std::cerr
         << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] "
-           "[vocabulary=FILE]\n";
+           "[reverse=0] [step=1] [min_focal=0] [vocabulary=FILE]\n";
     return 2;
   }
   try {
     const tessera::Arguments arguments = tessera::ParseArguments(argc, argv);
     const tessera::FeatureSequence sequence =
-        tessera::ExtractSequence(arguments.source, arguments.features, arguments.is_mirrored);
+        tessera::ExtractSequence(arguments.source, arguments.features, arguments.variation);
     const std::filesystem::path out_dir = argv[3];
     for (const int64_t delay : arguments.map_delays) {
       const bool is_single = arguments.map_delays.size() == 1;

@@ -25,7 +25,7 @@ Record MakeRecord(int num_features) {
   source.source = std::string("kitti:") + TESSERA_DATA + "/kitti/sequences/03";
   source.last_frame = kNumFrames;
   Record record;
-  record.frames = ExtractSequence(source, {.num_features = num_features}, false).frames;
+  record.frames = ExtractSequence(source, {.num_features = num_features}).frames;
   MapTracker tracker{MapTrackerOptions{}};
   Mapper mapper{MapperOptions{}};
   LogicalTime time(kMapDelayFrames);
