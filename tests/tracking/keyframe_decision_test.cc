@@ -70,8 +70,8 @@ TEST_F(Decision, AKeyframeBeforeTheShareFallsTooLow) {
   AskFirst();
   // 10 % lost over five intervals, so the next frame will see about 88 %.
   EXPECT_FALSE(Ask(Frame(6, 0, kNumPoints * 90 / 100)));
-  // 20 % lost over two intervals, so the next frame will see 70 %; 26 %, so it will see 61 %.
-  EXPECT_FALSE(Ask(Frame(3, 0, kNumPoints * 80 / 100)));
+  // 22 % lost over two intervals, so the next frame will see 67 %; 26 %, so it will see 61 %.
+  EXPECT_FALSE(Ask(Frame(3, 0, kNumPoints * 78 / 100)));
   EXPECT_TRUE(Ask(Frame(3, 0, kNumPoints * 74 / 100)));
 
   // Mono needs a keyframe earlier, while both it and the next one see the points.
@@ -79,7 +79,7 @@ TEST_F(Decision, AKeyframeBeforeTheShareFallsTooLow) {
   Start();
   AskFirst();
   EXPECT_FALSE(Ask(Frame(6, 0, kNumPoints * 90 / 100)));
-  EXPECT_TRUE(Ask(Frame(3, 0, kNumPoints * 80 / 100)));
+  EXPECT_TRUE(Ask(Frame(3, 0, kNumPoints * 78 / 100)));
 }
 
 TEST_F(Decision, SharesCountFromTheFrameAfterTheReference) {
