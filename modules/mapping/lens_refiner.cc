@@ -87,7 +87,8 @@ bool LensRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEdi
   next_look_ = {next.value + kMinInterval};
   if (keyframes.size() < kMinKeyframes || TurnOf(map, keyframes) < kMinTurn_rad) return false;
   const BundleProblem problem = ProblemOf(map, keyframes, max_landmarks_);
-  const std::optional<FocalEstimate> found = EstimateFocal(problem);
+  LensEstimator estimator(problem);
+  const std::optional<FocalEstimate> found = estimator.Focal();
   const bool is_error = found && IsError(*found, map.lens().is_known() ? kMinErrorLeft : kMinError);
   interval_ = is_error ? kMinInterval : std::clamp(2 * interval_, kMinInterval, kMaxInterval);
   next_look_ = {next.value + interval_};
@@ -95,7 +96,7 @@ bool LensRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEdi
   if (!is_error || !before || std::abs(before->error - found->error) > kMaxSigmasApart * before->sigma) return false;
   // Beyond what a calibration can be wrong by, something else is: a distortion that was never looked at.
   const CameraCalibration current = WithLens(given, map.lens());
-  const std::optional<LensError> error = EstimateLens(problem, {error_, current.radial});
+  const std::optional<LensError> error = estimator.Lens({error_, current.radial});
   if (!error) return false;
   const double total = FocalError(CorrectedBy({found->error, 0.0}, current), given);
   const double focal = FocalError(CorrectedBy(*error, current), given);

@@ -27,12 +27,6 @@ double Magnification(const CameraCalibration& calibration, double radial, const 
   return std::sqrt((1.0 + moved_by) * (1.0 + 3.0 * moved_by));
 }
 
-// NaN: can't be solved.
-double LeastCost(const BundleProblem& problem, const LensError& error) {
-  const std::optional<BundleResult> result = AdjustBundle(WithLensError(problem, error), OneRound());
-  return result ? result->final_cost : std::nan("");
-}
-
 // The parabola through (-step, before), (0, same), (step, after).
 struct Parabola {
   double slope = 0.0, curvature = 0.0;  // at 0
@@ -62,31 +56,37 @@ BundleProblem WithLensError(BundleProblem problem, const LensError& error) {
   return problem;
 }
 
-std::optional<FocalEstimate> EstimateFocal(const BundleProblem& problem) {
-  if (problem.points.empty()) return std::nullopt;
-  const Parabola costs = Through(LeastCost(problem, {-kFocalStep, 0.0}), LeastCost(problem, {}),
-                                 LeastCost(problem, {kFocalStep, 0.0}), kFocalStep);
+double LensEstimator::LeastCost(int focal_steps, int radial_steps) {
+  std::optional<double>& cost = least_costs_.at(static_cast<size_t>(3 * (focal_steps + 1) + radial_steps + 1));
+  if (!cost) {
+    const LensError error{focal_steps * kFocalStep, radial_steps * kRadialStep};
+    const std::optional<BundleResult> result = AdjustBundle(WithLensError(problem_, error), OneRound());
+    cost = result ? result->final_cost : std::nan("");
+  }
+  return *cost;
+}
+
+std::optional<FocalEstimate> LensEstimator::Focal() {
+  if (problem_.points.empty()) return std::nullopt;
+  const Parabola costs = Through(LeastCost(-1, 0), LeastCost(0, 0), LeastCost(1, 0), kFocalStep);
   if (!(costs.curvature > 0.0)) return std::nullopt;  // NaN, too
   return FocalEstimate{-costs.slope / costs.curvature, 1.0 / std::sqrt(costs.curvature)};
 }
 
-std::optional<LensError> EstimateLens(const BundleProblem& problem, const LensError& known) {
-  if (problem.points.empty()) return std::nullopt;
-  const double same = LeastCost(problem, {});
-  const double longer = LeastCost(problem, {kFocalStep, 0.0}), outward = LeastCost(problem, {0.0, kRadialStep});
-  const Parabola focal = Through(LeastCost(problem, {-kFocalStep, 0.0}), same, longer, kFocalStep);
-  const Parabola radial = Through(LeastCost(problem, {0.0, -kRadialStep}), same, outward, kRadialStep);
+std::optional<LensError> LensEstimator::Lens(const LensError& known) {
+  if (problem_.points.empty()) return std::nullopt;
+  const double same = LeastCost(0, 0), longer = LeastCost(1, 0), outward = LeastCost(0, 1);
+  const Parabola focal = Through(LeastCost(-1, 0), same, longer, kFocalStep);
+  const Parabola radial = Through(LeastCost(0, -1), same, outward, kRadialStep);
   // C(h, q) - C(h, 0) - C(0, q) + C(0, 0) = h q C''_12
-  const double mixed =
-      (LeastCost(problem, {kFocalStep, kRadialStep}) - longer - outward + same) / (kFocalStep * kRadialStep);
+  const double mixed = (LeastCost(1, 1) - longer - outward + same) / (kFocalStep * kRadialStep);
 
+  // What calibrations are wrong by, as information.
+  const Eigen::Vector2d usual(1.0 / (kFocalSigma * kFocalSigma), 1.0 / (kRadialSigma * kRadialSigma));
   Eigen::Matrix2d curvature{{focal.curvature, mixed}, {mixed, radial.curvature}};
-  curvature = curvature / kImagesVariance +
-              Eigen::Vector2d(1.0 / (kFocalSigma * kFocalSigma), 1.0 / (kRadialSigma * kRadialSigma))
-                  .asDiagonal()
-                  .toDenseMatrix();
-  const Eigen::Vector2d slope(focal.slope / kImagesVariance + known.focal / (kFocalSigma * kFocalSigma),
-                              radial.slope / kImagesVariance + known.radial / (kRadialSigma * kRadialSigma));
+  curvature = curvature / kImagesVariance + usual.asDiagonal().toDenseMatrix();
+  const Eigen::Vector2d slope(focal.slope / kImagesVariance + known.focal * usual.x(),
+                              radial.slope / kImagesVariance + known.radial * usual.y());
   if (!(curvature(0, 0) > 0.0 && curvature.determinant() > 0.0)) return std::nullopt;
   const Eigen::Vector2d error = -curvature.inverse() * slope;
   return LensError{error.x(), error.y()};

@@ -42,9 +42,11 @@ BundleProblem InImage(const LensError& error) {
   return WithLensError(problem, error);
 }
 
+std::optional<FocalEstimate> FocalOf(const BundleProblem& problem) { return LensEstimator(problem).Focal(); }
+
 TEST(FocalEstimation, FindsByHowMuchTheFocalLengthsAreWrong) {
   for (const double error : {-0.015, 0.0}) {
-    const std::optional<FocalEstimate> estimate = EstimateFocal(ProblemOf(Turning(), {error, 0.0}));
+    const std::optional<FocalEstimate> estimate = FocalOf(ProblemOf(Turning(), {error, 0.0}));
     ASSERT_TRUE(estimate);
     EXPECT_LT(estimate->sigma, 0.004);
     const double left = (1.0 + error) * (1.0 + estimate->error) - 1.0;
@@ -76,11 +78,11 @@ TEST(LensEstimation, AnErrorAndItsOppositeLeaveTheProblemAsItWas) {
 TEST(LensEstimation, FindsTheDistortionAndTheFocalLengthTogether) {
   for (const LensError& wrong : {LensError{0.0, 0.006}, LensError{0.015, 0.0}, LensError{0.01, 0.004}, LensError{}}) {
     const BundleProblem problem = InImage(wrong);
-    const std::optional<LensError> found = EstimateLens(problem, {});
+    const std::optional<LensError> found = LensEstimator(problem).Lens({});
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->focal, -wrong.focal, 0.006) << wrong.focal << ' ' << wrong.radial;
     EXPECT_NEAR(found->radial, -wrong.radial, 0.003) << wrong.focal << ' ' << wrong.radial;
-    const std::optional<FocalEstimate> left = EstimateFocal(WithLensError(problem, *found));
+    const std::optional<FocalEstimate> left = FocalOf(WithLensError(problem, *found));
     ASSERT_TRUE(left);
     EXPECT_LT(std::abs(left->error), std::max(0.004, 4.0 * left->sigma));
   }
@@ -88,7 +90,8 @@ TEST(LensEstimation, FindsTheDistortionAndTheFocalLengthTogether) {
 
 TEST(LensEstimation, WhatIsKnownAlreadyMakesMoreOfTheSameLessLikely) {
   const BundleProblem problem = InImage({0.0, 0.006});
-  const std::optional<LensError> first = EstimateLens(problem, {}), further = EstimateLens(problem, {-0.01, -0.02});
+  LensEstimator estimator(problem);
+  const std::optional<LensError> first = estimator.Lens({}), further = estimator.Lens({-0.01, -0.02});
   ASSERT_TRUE(first && further);
   EXPECT_GT(further->radial, first->radial);
 }
@@ -96,8 +99,8 @@ TEST(LensEstimation, WhatIsKnownAlreadyMakesMoreOfTheSameLessLikely) {
 TEST(FocalEstimation, KnowsMoreByMorePoints) {
   SyntheticBundleOptions some = Turning();
   some.num_points /= 4;
-  const std::optional<FocalEstimate> little = EstimateFocal(ProblemOf(some, {}));
-  const std::optional<FocalEstimate> much = EstimateFocal(ProblemOf(Turning(), {}));
+  const std::optional<FocalEstimate> little = FocalOf(ProblemOf(some, {}));
+  const std::optional<FocalEstimate> much = FocalOf(ProblemOf(Turning(), {}));
   ASSERT_TRUE(little && much);
   EXPECT_NEAR(little->sigma / much->sigma, 2.0, 0.6);
 }
@@ -106,8 +109,8 @@ TEST(LensEstimation, IsNoneWithoutPoints) {
   BundleProblem problem = ProblemOf(Turning(), {});
   problem.points.clear();
   problem.observations.clear();
-  EXPECT_FALSE(EstimateFocal(problem));
-  EXPECT_FALSE(EstimateLens(problem, {}));
+  EXPECT_FALSE(FocalOf(problem));
+  EXPECT_FALSE(LensEstimator(problem).Lens({}));
 }
 
 }  // namespace
