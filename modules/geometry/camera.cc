@@ -46,7 +46,7 @@ Eigen::Vector2d MovedByLens(const CameraCalibration& calibration, double radial,
 Eigen::Vector2d BeforeLens(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& moved) {
   const Eigen::Vector2d from_center = moved - Eigen::Vector2d(calibration.cx_px, calibration.cy_px);
   const double distance = from_center.norm() / (0.5 * calibration.width_px);
-  if (distance == 0.0) return moved;
+  if (radial == 0.0 || distance == 0.0) return moved;
   constexpr int kNumSteps = 5;  // Newton's, of r + radial r^3 = distance
   double r = distance;
   for (int i = 0; i < kNumSteps; ++i) r -= (r + radial * r * r * r - distance) / (1.0 + 3.0 * radial * r * r);
