@@ -17,7 +17,7 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr double kCell_px = 32.0;  // the width of a descriptor's patch on the finest level
 constexpr int kDegreesOfFreedom = 6;
 constexpr int kMinCells = 2 * kDegreesOfFreedom;
-// Of t in KeptVariance: below the first, hardly anything depends on it; beyond the last, no noise is cut off.
+// Of t in KeptVariance: below the first, errors within the limit hardly show it; beyond the last, no noise is cut off.
 constexpr double kLeastLimit = 1.0;
 constexpr double kGreatestLimit = 20.0;
 constexpr int kNumHalvings = 20;

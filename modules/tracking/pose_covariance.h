@@ -37,8 +37,8 @@ std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame);
 //
 //   K = 1 - 1 / S(t),   S(t) = sum_j t^j / ((k/2 + 1) ... (k/2 + j)),   mean squared error = k v K
 //
-// `mean_share`: the mean squared error by the limit, which tells v; `freedom`: k. In (0, 1]; noise of which more than
-// two thirds are beyond the limit can't be told from outliers, and counts as that much.
+// `mean_share`: the mean squared error by the limit, which tells v; `freedom`: k. t counts as at least 1: with more
+// noise (in two dimensions, more than a third of it beyond the limit) what is left looks the same.
 double KeptVariance(double mean_share, double freedom);
 
 // The residuals themselves say how noisy keypoints are, on whatever level and however wrong the points may be
