@@ -29,10 +29,10 @@ struct PointInfluence {
 using PoseInfluences = std::vector<PointInfluence>;
 std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame);
 
-// Points whose squared error is beyond a limit were taken out as outliers, and with them the tail of the noise. What is
-// left spreads less than the noise does, and holds the pose less than it seems to: a pose that moves finds other points
-// within the limit. Both by the same share K of the variance, so that the pose's variance is 1 / K^2 of what residuals
-// show (the asymptotic variance of a skipped mean: P. Huber, "Robust Statistics", 1981). Of Gaussian noise of variance
+// Points whose squared error is beyond a limit were taken out as outliers, and with them the tail of the noise. So the
+// rest varies less than the noise does: by a factor K. And it holds the pose less than it seems to, since a pose that
+// moves finds other points within the limit: by K again. The pose's covariance is 1 / K^2 of what residuals show (the
+// asymptotic variance of a skipped mean: P. Huber, "Robust Statistics", 1981). Of Gaussian noise of variance
 // v in k dimensions, with t = limit / 2 v:
 //
 //   K = 1 - 1 / S(t),   S(t) = sum_j t^j / ((k/2 + 1) ... (k/2 + j)),   mean squared error = k v K

@@ -50,24 +50,28 @@ Rigid3 Mirrored(const Rigid3& pose) {
   return {Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()), {-t.x(), t.y(), t.z()}};
 }
 
-// Numbers the frames from 0 on, in their order, or the last one first. Truth of other frames goes.
-void Renumber(bool is_reversed, FeatureSequence& sequence) {
-  if (sequence.frames.empty()) return;
-  const int64_t first_and_last_us = sequence.frames.front().utime_us + sequence.frames.back().utime_us;
-  if (is_reversed) std::ranges::reverse(sequence.frames);
+// Numbers the frames from 0 on, in their order. Truth of other frames goes.
+void Renumber(FeatureSequence& sequence) {
   std::map<FrameId, FrameId> number_of;
   for (FeatureFrame& frame : sequence.frames) {
     const FrameId number{static_cast<int64_t>(number_of.size())};
     number_of[frame.frame] = number;
     frame.frame = number;
-    if (is_reversed) frame.utime_us = first_and_last_us - frame.utime_us;
   }
   std::erase_if(sequence.ground_truth, [&](const GroundTruthPose& pose) { return !number_of.contains(pose.frame); });
-  if (is_reversed) std::ranges::reverse(sequence.ground_truth);
-  for (GroundTruthPose& pose : sequence.ground_truth) {
-    pose.frame = number_of.at(pose.frame);
-    if (is_reversed) pose.utime_us = first_and_last_us - pose.utime_us;
-  }
+  for (GroundTruthPose& pose : sequence.ground_truth) pose.frame = number_of.at(pose.frame);
+}
+
+// The last frame comes first, at the time of the first.
+void ReverseTime(FeatureSequence& sequence) {
+  if (sequence.frames.empty()) return;
+  const int64_t first_and_last_us = sequence.frames.front().utime_us + sequence.frames.back().utime_us;
+  for (FeatureFrame& frame : sequence.frames) frame.utime_us = first_and_last_us - frame.utime_us;
+  for (GroundTruthPose& pose : sequence.ground_truth) pose.utime_us = first_and_last_us - pose.utime_us;
+  std::ranges::reverse(sequence.frames);
+  std::ranges::reverse(sequence.ground_truth);
+  std::ranges::reverse(sequence.extract_ms);
+  std::ranges::reverse(sequence.num_corners);
 }
 
 }  // namespace
@@ -91,7 +95,8 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
       return ExtractFrame(*frame, sequence.calibration, feature_options, extractor, &num_corners);
     }));
   }
-  if (variation.is_reversed || variation.step > 1) Renumber(variation.is_reversed, sequence);
+  if (variation.is_reversed) ReverseTime(sequence);
+  if (variation.is_reversed || variation.step > 1) Renumber(sequence);
   return sequence;
 }
 
