@@ -171,9 +171,10 @@ void MapTracker::DescribePose(MapTrackingResult& result) {
   if (result.pose.num_inliers == 0) CountPoints(result.pose);  // a map begins: its first points
   result.pose.is_keyframe = !result.keyframes.empty();
   result.pose.is_step_doubtful = last_->is_doubtful;
-  result.pose.scale_sigma = scale_.RecentDrift(result.pose.utime_us);
+  result.pose.scale_sigma = std::max(scale_.RecentDrift(result.pose.utime_us), ground_.ScaleFall());
   result.pose.body = DescribeBody();
   tracked_utime_us_ = result.pose.utime_us;
+  reference_scale_ = WorldFromReference().scale;
 }
 
 // The camera as a body of its own.
@@ -237,20 +238,34 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   return true;
 }
 
-// Two views don't know how far apart they are: as far as the camera goes in that time, if it still moves as it did when
-// it was lost, and on its way from there. That is a guess until a loop joins the parts.
+// Two views don't know how far apart they are: as far as the ground tells, or as the camera goes in that time, if it
+// still moves as it did when it was lost, and on its way from there. That is a guess until a loop joins the parts.
 void MapTracker::TakeOverMotion(MonoStart& start) {
-  if (!drift_) return;
   const double interval_s = SecondsBetween(*start.first, *start.second);
-  const double scale = drift_->velocity.norm() * interval_s / start.second_from_first.translation.norm();
+  std::optional<double> length = LengthByGround(start);
+  if (!length && drift_) length = drift_->velocity.norm() * interval_s;
+  if (!length) {
+    ground_.ForgetHeight();
+    return;
+  }
+  const double scale = *length / start.second_from_first.translation.norm();
   start.second_from_first.translation *= scale;
   for (MonoStart::Point& point : start.points) {
     point.point.point_in_world *= scale;
     point.point.covariance *= scale * scale;
   }
+  if (!drift_) return;
   const double lost_s = 1e-6 * static_cast<double>(start.first->features().utime_us - drift_->utime_us);
   world_from_start_ = world_from_start_ * Rigid3{Eigen::Quaterniond::Identity(), drift_->velocity * lost_s};
   drift_.reset();
+}
+
+std::optional<double> MapTracker::LengthByGround(const MonoStart& start) {
+  const double interval_s = SecondsBetween(*start.first, *start.second);
+  if (!tracked_utime_us_ || interval_s <= 0.0) return std::nullopt;
+  const double gap_s = 1e-6 * static_cast<double>(start.first->features().utime_us - *tracked_utime_us_);
+  return ground_.LengthAfterGap(*start.first, *start.second, start.second_from_first.Inverse(), interval_s,
+                                std::max(gap_s, 0.0));
 }
 
 // The map may have changed: the last frame keeps its pose relative to its reference, and its points move with the map.
@@ -261,6 +276,8 @@ void MapTracker::UpdateLast() {
     *reference_influences_ = ByPoint(std::move(*reference_influences_), true);
   }
   if (const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_)) {
+    ground_.Rescale(world_from_reference->scale / reference_scale_);
+    reference_scale_ = world_from_reference->scale;
     last_->frame.world_from_camera = (*world_from_reference * last_->reference_from_camera).Pose();
   }
   for (SeenPoint& point : last_->frame.points) {
@@ -449,6 +466,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   MatchLocal(LocalPoints(replica_, frame, options_.search.max_local_keyframes),
              options_.search.matching.local_radius_px, options_.search.matching, frame);
   if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
+  if (!reference_.valid() || replica_.PartOf(reference_) != replica_.PartOf(answer.reference)) ground_.ForgetHeight();
   reference_ = answer.reference;
   reference_frame_.reset();
   reference_influences_.reset();
@@ -473,6 +491,7 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
     motion_.Add(last_->reference_from_camera.Inverse() * reference_from_camera, covariance, interval_s,
                 pose.evidence == StepEvidence::kWeak);
   }
+  WatchGround(frame, pose);
   camera_motion_ = MotionOf(frame);
   const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
   LearnReadout(frame);
@@ -511,6 +530,19 @@ void MapTracker::LearnReadout(const TrackedFrame& frame) {
 void MapTracker::WatchScale(const Rigid3& reference_from_camera) {
   const Eigen::Vector3d step = reference_from_camera.rotation.inverse() * reference_from_camera.translation;
   scale_.Add(last_->frame.view->features().utime_us, step, last_->covariance);
+}
+
+void MapTracker::WatchGround(const TrackedFrame& frame, const FramePose& pose) {
+  const double interval_s = SinceLast(*frame.view);
+  const Rigid3 last_from_current = last_->frame.world_from_camera.Inverse() * frame.world_from_camera;
+  const double length = last_from_current.translation.norm();
+  if (frame.view->baseline_m() > 0.0 || lost_since_us_ || interval_s <= 0.0 || length == 0.0) return;
+  const Eigen::Matrix3d covariance = TranslationCovariance(pose.optimized.information);
+  const Eigen::Vector3d direction = last_from_current.rotation.conjugate() * last_from_current.translation / length;
+  const double variance_across = 0.5 * (covariance.trace() - direction.dot(covariance * direction));
+  ground_.Add(*last_->frame.view, *frame.view,
+              {last_from_current, interval_s, std::sqrt(std::max(variance_across, 0.0)) / length,
+               pose.evidence != StepEvidence::kWeak});
 }
 
 void MapTracker::ResetMotion() {

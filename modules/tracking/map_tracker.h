@@ -19,6 +19,7 @@
 #include "messages/loop_types.h"
 #include "messages/tracking_types.h"
 #include "tracking/frame_search.h"
+#include "tracking/ground_watch.h"
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/map_replica.h"
@@ -143,7 +144,9 @@ class MapTracker {
   void ResetMotion();
   std::optional<Drift> DriftNow() const;
   void TakeOverMotion(MonoStart& start);
+  std::optional<double> LengthByGround(const MonoStart& start);
   void WatchScale(const Rigid3& reference_from_camera);
+  void WatchGround(const TrackedFrame& frame, const FramePose& pose);
   bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
   FramePose OptimizeWithMotion(TrackedFrame& frame) const;
   std::optional<Matrix6d> CovarianceFromReference(const TrackedFrame& frame,
@@ -169,6 +172,7 @@ class MapTracker {
   std::optional<CameraMotion> camera_motion_at_reference_;  // likewise
   KeyframeId next_keyframe_{0};
   KeyframeId reference_;
+  double reference_scale_ = 1.0;  // of its units, when the last frame was tracked or the map changed
   // By point: its own, or those of the first frame tracked from it.
   std::optional<PoseInfluences> reference_influences_;
   WayCorrections way_corrections_;
@@ -177,6 +181,7 @@ class MapTracker {
   Rigid3 world_from_start_;        // camera where the next part of the map begins
   std::optional<Drift> drift_;     // of the last loss
   ScaleWatch scale_;               // mono
+  GroundWatch ground_;             // mono; in units of the world
   int64_t previous_utime_us_ = 0;  // of the frame before
   std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;

@@ -136,6 +136,29 @@ void WriteFigures(const FeatureSequence& sequence, const OfflineRun& run, const 
        << map.closed_loops().size() << ',' << length_m << ',' << rms_m << '\n';
 }
 
+// Stretches of which the run says that the scale may have changed (MAX_SCALE_SIGMA of procman).
+void ReportDoubtfulScale(const std::vector<PoseEstimate>& poses) {
+  constexpr double kMaxSigma = 0.25;
+  constexpr int64_t kMaxGap_frames = 10;
+  struct Stretch {
+    int64_t first, last;
+    double sigma;
+  };
+  std::vector<Stretch> stretches;
+  for (const PoseEstimate& pose : poses) {
+    if (pose.state != TrackingState::kTracked || pose.scale_sigma <= kMaxSigma) continue;
+    const int64_t frame = pose.frame.value;
+    if (stretches.empty() || frame > stretches.back().last + kMaxGap_frames) stretches.push_back({frame, frame, 0.0});
+    stretches.back().last = frame;
+    stretches.back().sigma = std::max(stretches.back().sigma, pose.scale_sigma);
+  }
+  std::printf("scale told to be in doubt in frames:");
+  for (const Stretch& stretch : stretches) {
+    std::printf(" %ld to %ld (%.2f)", static_cast<long>(stretch.first), static_cast<long>(stretch.last), stretch.sigma);
+  }
+  std::printf("%s\n", stretches.empty() ? " none" : "");
+}
+
 void Report(const FeatureSequence& sequence, const OfflineRun& run) {
   const bool is_mono = sequence.calibration.sensor == SensorType::kMono;
   const std::map<FrameId, Rigid3> optimized = run.Optimized();
@@ -148,6 +171,7 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
               map.Sha256Hex().c_str());
   std::printf("RMS error %.4f m, live %.4f m\n", RmsError(optimized, sequence.ground_truth, is_mono).value_or(-1.0),
               RmsError(run.Live(), sequence.ground_truth, is_mono).value_or(-1.0));
+  if (is_mono) ReportDoubtfulScale(run.poses);
   if (const auto scale = is_mono ? MeasureScale(optimized, sequence.ground_truth) : std::nullopt) {
     std::printf("scale: greatest change within 10 s %.3f, until %.1f s; typical change over 5 s %.3f\n",
                 scale->greatest, scale->greatest_s, scale->typical);

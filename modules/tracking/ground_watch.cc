@@ -1,0 +1,134 @@
+#include "tracking/ground_watch.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace tessera {
+namespace {
+
+constexpr double kMaxDirectionSigma_rad = 0.01;  // of steps that teach how the camera is mounted
+constexpr int kMinDirections = 10;
+constexpr int kMaxDirections = 300;      // of which the mean is taken
+constexpr double kLevelWeight = 0.1;     // how much a camera is expected not to be rolled, and
+constexpr double kForwardWeight = 0.01;  // not to look down, in place of so many directions
+constexpr double kMinDown = 0.7;         // of the image's own down
+constexpr double kMinDirectionVariance = 1e-5;
+constexpr double kMaxSpeedSigma = 0.15;  // of the logarithm of a speed that says something of the height
+constexpr size_t kNumHeights = 100;      // remembered
+constexpr size_t kMinHeights = 60;       // to know it
+constexpr double kNear = 0.25;           // in the logarithm: about the same height
+constexpr double kMinShareNear = 0.75;
+constexpr size_t kNumLatest = 20;
+constexpr double kMaxBend = 0.5;  // of the logarithm of the height
+constexpr int kNumFirstSteps = 200, kStepsBetween = 4;
+constexpr double kPairEvidence = 8.0;  // what one step may say if it is all there is
+constexpr double kMaxLengthSigma = 0.3;
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+void GroundWatch::Add(const FrameView& last, const FrameView& current, const Step& step) {
+  const double length = step.last_from_current.translation.norm();
+  const Eigen::Quaterniond& rotation = step.last_from_current.rotation;
+  const Eigen::Vector3d seen = rotation.conjugate() * step.last_from_current.translation / length;
+  if (step.is_seen && step.direction_sigma_rad < kMaxDirectionSigma_rad) LearnDirection(seen);
+  // A camera that isn't carried over ground, as far as is known, is looked at now and then.
+  ++num_steps_;
+  const std::optional<Eigen::Vector3d> down = Down();
+  const bool is_asked = down && (log_height_ || num_steps_ < kNumFirstSteps || num_steps_ % kStepsBetween == 0);
+  const Rigid3 way{rotation, rotation * Direction(step, seen)};
+  speed_.Add(is_asked ? SpeedOverGround(last, current, way, *down, step.interval_s) : std::nullopt, step.interval_s);
+  if (is_asked && speed_.sigma() < kMaxSpeedSigma) LearnHeight(std::log(length / step.interval_s) - speed_.log_speed());
+}
+
+void GroundWatch::Rescale(double factor) {
+  const double change = std::log(factor);
+  for (double& log_height : log_heights_) log_height += change;
+  if (log_height_) *log_height_ += change;
+}
+
+void GroundWatch::ForgetHeight() {
+  log_heights_.clear();
+  log_height_.reset();
+}
+
+std::optional<double> GroundWatch::LengthAfterGap(const FrameView& last, const FrameView& current,
+                                                  const Rigid3& last_from_current, double interval_s, double gap_s) {
+  const std::optional<Eigen::Vector3d> down = Down();
+  if (!log_height_ || !down) return std::nullopt;
+  if (gap_s > 0.0) speed_.Add(std::nullopt, gap_s);
+  speed_.Add(SpeedOverGround(last, current, last_from_current, *down, interval_s), interval_s, kPairEvidence);
+  if (speed_.sigma() > kMaxLengthSigma) return std::nullopt;
+  return std::exp(*log_height_ + speed_.log_speed()) * interval_s;
+}
+
+double GroundWatch::ScaleFall() const {
+  if (!log_height_ || log_heights_.size() < kNumLatest || !speed_.is_plausible()) return 0.0;
+  const double fall = *log_height_ - Median({log_heights_.end() - kNumLatest, log_heights_.end()});
+  return fall > kMaxBend ? fall : 0.0;
+}
+
+std::optional<double> GroundWatch::height() const {
+  if (!log_height_) return std::nullopt;
+  return std::exp(*log_height_);
+}
+
+void GroundWatch::LearnDirection(const Eigen::Vector3d& direction) {
+  num_directions_ = std::min(num_directions_ + 1, kMaxDirections);
+  const double share = 1.0 / num_directions_;
+  direction_moments_ += share * (direction * direction.transpose() - direction_moments_);
+  mean_direction_ += share * (direction - mean_direction_);
+  direction_variance_ += share * (0.5 * (direction - mean_direction_).squaredNorm() - direction_variance_);
+}
+
+// The camera's direction of travel: as this step has it, and as the others had it.
+Eigen::Vector3d GroundWatch::Direction(const Step& step, const Eigen::Vector3d& seen) const {
+  if (num_directions_ < kMinDirections) return seen;
+  if (!step.is_seen) return mean_direction_.normalized();
+  const double information = 1.0 / (step.direction_sigma_rad * step.direction_sigma_rad);
+  const double usual_information = 1.0 / (direction_variance_ + kMinDirectionVariance);
+  return (information * seen + usual_information * mean_direction_).normalized();
+}
+
+// At right angles to the directions of travel; of those that are, the one that is nearest to the image's own down.
+// nullopt: the camera goes up and down, or lies on its side.
+std::optional<Eigen::Vector3d> GroundWatch::Down() const {
+  const double share = 1.0 / (num_directions_ + 1);
+  Eigen::Matrix3d moments = direction_moments_;
+  moments(0, 0) += share * kLevelWeight;
+  moments(2, 2) += share * kForwardWeight;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments);
+  const Eigen::Vector3d axis = solver.eigenvectors().col(0);
+  if (std::abs(axis.y()) < kMinDown) return std::nullopt;
+  return axis.y() < 0.0 ? Eigen::Vector3d(-axis) : axis;
+}
+
+// A height that most of the last ones are near to is known, and becomes the mean of those that are; one that none has
+// been near to for long is another one.
+void GroundWatch::LearnHeight(double log_height) {
+  log_heights_.push_back(log_height);
+  if (log_heights_.size() > kNumHeights) log_heights_.pop_front();
+  if (log_height_) {
+    const bool is_near = std::abs(log_height - *log_height_) < kNear;
+    num_elsewhere_ = is_near ? 0 : num_elsewhere_ + 1;
+    if (is_near) *log_height_ += (log_height - *log_height_) / ++num_in_height_;
+    if (num_elsewhere_ >= static_cast<int>(kNumHeights)) log_height_.reset();
+  }
+  if (log_height_ || log_heights_.size() < kMinHeights) return;
+  const double median = Median({log_heights_.begin(), log_heights_.end()});
+  const auto num_near =
+      std::ranges::count_if(log_heights_, [&](double height) { return std::abs(height - median) < kNear; });
+  if (static_cast<double>(num_near) < kMinShareNear * static_cast<double>(log_heights_.size())) return;
+  log_height_ = median;
+  num_in_height_ = static_cast<int>(num_near);
+  num_elsewhere_ = 0;
+}
+
+}  // namespace tessera
