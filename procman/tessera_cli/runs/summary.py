@@ -318,7 +318,8 @@ def _open_scale(frames: Frames, stretch: list[int]) -> str:
     sigma = float(np.max(frames.scale_sigma[np.isin(frames.numbers, stretch)]))
     return (
         f"The scale may have slipped {_where(stretch)} by a factor of {np.exp(sigma):.1f} (one standard deviation): "
-        "the images left open how far the camera went; what follows may lie on another scale."
+        "the images left open how far the camera went, or the ground below it says otherwise; "
+        "what follows may lie on another scale."
     )
 
 
