@@ -37,8 +37,8 @@ struct PoseEstimate {
   // The images contradict the motion of a moment ago: the scale may have slipped, or the camera was carried away.
   bool is_step_doubtful = false;
   // Mono: by how much the scale may have changed in the last seconds (tracking/scale_watch.h), a standard deviation of
-  // its logarithm; or by how much the ground says that it has fallen (tracking/ground_watch.h), if that is more. 0 where
-  // depth is measured.
+  // its logarithm; or by how much the ground says that it has fallen (tracking/ground_watch.h), if that is more. 0
+  // where depth is measured.
   double scale_sigma = 0.0;
   FrameId relocalized_by;         // the frame whose RELOCALIZATION this one was placed by; invalid: none was used
   int64_t num_deltas = 0;         // deltas that the map had seen by then: its step

@@ -92,7 +92,7 @@ void GroundWatch::LearnDirection(const Eigen::Vector3d& direction) {
 Eigen::Vector3d GroundWatch::Direction(const Step& step, const Eigen::Vector3d& seen) const {
   if (num_directions_ < kMinDirections) return seen;
   if (!step.is_seen) return mean_direction_.normalized();
-  const double information = 1.0 / (step.direction_sigma_rad * step.direction_sigma_rad);
+  const double information = 1.0 / (step.direction_sigma_rad * step.direction_sigma_rad + kMinDirectionVariance);
   const double usual_information = 1.0 / (direction_variance_ + kMinDirectionVariance);
   return (information * seen + usual_information * mean_direction_).normalized();
 }

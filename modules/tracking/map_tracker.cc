@@ -468,6 +468,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
   if (!reference_.valid() || replica_.PartOf(reference_) != replica_.PartOf(answer.reference)) ground_.ForgetHeight();
   reference_ = answer.reference;
+  reference_scale_ = world_from_reference->scale;
   reference_frame_.reset();
   reference_influences_.reset();
   decision_.Restart(frame);

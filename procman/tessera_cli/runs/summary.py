@@ -317,7 +317,7 @@ def _contradiction(stretch: list[int], sensor: str) -> str:
 def _open_scale(frames: Frames, stretch: list[int]) -> str:
     sigma = float(np.max(frames.scale_sigma[np.isin(frames.numbers, stretch)]))
     return (
-        f"The scale may have slipped {_where(stretch)} by a factor of {np.exp(sigma):.1f} (one standard deviation): "
+        f"The scale may have slipped {_where(stretch)} by a factor of {np.exp(sigma):.1f} or so: "
         "the images left open how far the camera went, or the ground below it says otherwise; "
         "what follows may lie on another scale."
     )
