@@ -3,7 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <vector>
+
+#include "core/quantile.h"
 
 namespace tessera {
 namespace {
@@ -25,12 +26,6 @@ constexpr double kMaxBend = 0.5;  // of the logarithm of the height
 constexpr int kNumFirstSteps = 200, kStepsBetween = 4;
 constexpr double kPairEvidence = 8.0;  // what one step may say if it is all there is
 constexpr double kMaxLengthSigma = 0.3;
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -71,7 +66,7 @@ std::optional<double> GroundWatch::LengthAfterGap(const FrameView& last, const F
 
 double GroundWatch::ScaleFall() const {
   if (!log_height_ || log_heights_.size() < kNumLatest || !speed_.is_plausible()) return 0.0;
-  const double fall = *log_height_ - Median({log_heights_.end() - kNumLatest, log_heights_.end()});
+  const double fall = *log_height_ - OrderStatistic({log_heights_.end() - kNumLatest, log_heights_.end()}, 0.5);
   return fall > kMaxBend ? fall : 0.0;
 }
 
@@ -122,7 +117,7 @@ void GroundWatch::LearnHeight(double log_height) {
     if (num_elsewhere_ >= static_cast<int>(kNumHeights)) log_height_.reset();
   }
   if (log_height_ || log_heights_.size() < kMinHeights) return;
-  const double median = Median({log_heights_.begin(), log_heights_.end()});
+  const double median = OrderStatistic({log_heights_.begin(), log_heights_.end()}, 0.5);
   const auto num_near =
       std::ranges::count_if(log_heights_, [&](double height) { return std::abs(height - median) < kNear; });
   if (static_cast<double>(num_near) < kMinShareNear * static_cast<double>(log_heights_.size())) return;

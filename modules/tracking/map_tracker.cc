@@ -242,7 +242,7 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
 // still moves as it did when it was lost, and on its way from there. That is a guess until a loop joins the parts.
 void MapTracker::TakeOverMotion(MonoStart& start) {
   const double interval_s = SecondsBetween(*start.first, *start.second);
-  std::optional<double> length = LengthByGround(start);
+  std::optional<double> length = LengthByGround(start, interval_s);
   if (!length && drift_) length = drift_->velocity.norm() * interval_s;
   if (!length) {
     ground_.ForgetHeight();
@@ -260,8 +260,7 @@ void MapTracker::TakeOverMotion(MonoStart& start) {
   drift_.reset();
 }
 
-std::optional<double> MapTracker::LengthByGround(const MonoStart& start) {
-  const double interval_s = SecondsBetween(*start.first, *start.second);
+std::optional<double> MapTracker::LengthByGround(const MonoStart& start, double interval_s) {
   if (!tracked_utime_us_ || interval_s <= 0.0) return std::nullopt;
   const double gap_s = 1e-6 * static_cast<double>(start.first->features().utime_us - *tracked_utime_us_);
   return ground_.LengthAfterGap(*start.first, *start.second, start.second_from_first.Inverse(), interval_s,

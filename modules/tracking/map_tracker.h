@@ -144,7 +144,7 @@ class MapTracker {
   void ResetMotion();
   std::optional<Drift> DriftNow() const;
   void TakeOverMotion(MonoStart& start);
-  std::optional<double> LengthByGround(const MonoStart& start);
+  std::optional<double> LengthByGround(const MonoStart& start, double interval_s);
   void WatchScale(const Rigid3& reference_from_camera);
   void WatchGround(const TrackedFrame& frame, const FramePose& pose);
   bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
