@@ -68,6 +68,7 @@ const std::optional<Rigid3>& FrameSearch::PoseByPair() {
 }
 
 bool FrameSearch::PairContradicts(const Rigid3& world_from_camera) {
+  if (view_->baseline_m() > 0.0) return false;
   const double turn_sigma_px = view_->calibration().fx_px * expected_.turn_sigma_rad;
   if (turn_sigma_px < options_.matching.last_radius_px || IsAsExpected(world_from_camera)) return false;
   const std::optional<Rigid3>& by_pair = PoseByPair();
@@ -120,7 +121,6 @@ bool FrameSearch::IsWide(const TrackedFrame& frame) const {
 }
 
 std::optional<Rigid3> FrameSearch::SearchByPair() const {
-  if (view_->baseline_m() > 0.0) return std::nullopt;
   const std::optional<Rigid3> last_from_current = EstimatePairMotion(last_, *view_, expected_.way, {});
   return last_from_current ? std::optional(last_.world_from_camera * *last_from_current) : std::nullopt;
 }

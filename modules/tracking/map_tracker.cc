@@ -434,8 +434,9 @@ bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation
   TrackedFrame frame(search.view());
   frame.world_from_camera = *world_from_camera;
   MatchLast(last_->frame, options_.search.matching.last_radius_px, options_.search.matching, frame);
-  OptimizeFrame(options_.search.pose, frame);  // leaves the points that agree with one another
-  frame.world_from_camera = *world_from_camera;
+  const int num_agreeing = OptimizeFrame(options_.search.pose, frame);  // leaves points that agree with one another
+  const bool has_depth = frame.view->baseline_m() > 0.0;
+  if (!has_depth || num_agreeing < options_.min_inliers) frame.world_from_camera = *world_from_camera;
   const Rigid3 reference_from_camera = (WorldFromReference().Inverse() * frame.world_from_camera).Pose();
   const double sigma = kPairSigmaShare * reference_from_camera.translation.norm();
   const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
@@ -661,7 +662,7 @@ KeyframeObservation MapTracker::MakeKeyframe(TrackedFrame& frame, KeyframeId ref
   }
   reference_ = keyframe.id;
   reference_influences_ = InfluencesOnReference(frame, reference);
-  if (frame.view->baseline_m() == 0.0) reference_frame_ = frame;
+  reference_frame_ = frame;
   camera_motion_at_reference_ = camera_motion_;
   ++next_keyframe_.value;
   if (last_) last_->reference_from_camera = Rigid3::Identity();

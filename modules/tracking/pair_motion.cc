@@ -4,20 +4,32 @@
 #include <cmath>
 #include <vector>
 
+#include "measurement/keypoint_measurement.h"
 #include "measurement/landmark_description.h"
 
 namespace tessera {
 namespace {
 
-// How long the step is by each known point that both frames see.
+// In front of the last frame's camera, by the known point that it sees there or by what it measured itself; nullopt:
+// neither.
+std::optional<double> DepthInLast(const TrackedFrame& last, const Rigid3& last_from_world, int32_t keypoint) {
+  const SeenPoint& known = last.points[Index(keypoint)];
+  if (known.valid() && HasDepth(known.landmark, last.world_from_camera.translation)) {
+    return (last_from_world * known.landmark.position_in_world).z();
+  }
+  const std::optional<Eigen::Vector3d> measured = PointFromDepth(last.view->features(), keypoint);
+  return measured ? std::optional(measured->z()) : std::nullopt;
+}
+
+// How long the step is by each point that both frames see and whose depth is known.
 std::vector<double> StepLengths(const TrackedFrame& last, const std::vector<Match>& matches,
                                 const TwoViewResult& views) {
   const Rigid3 last_from_world = last.world_from_camera.Inverse();
   std::vector<double> lengths;
   for (size_t k = 0; k < matches.size(); ++k) {
-    const SeenPoint& known = last.points[Index(matches[k].first)];
-    if (!views.points[k] || !known.valid() || !HasDepth(known.landmark, last.world_from_camera.translation)) continue;
-    lengths.push_back((last_from_world * known.landmark.position_in_world).z() / views.points[k]->z());
+    if (!views.points[k]) continue;
+    const std::optional<double> depth = DepthInLast(last, last_from_world, matches[k].first);
+    if (depth) lengths.push_back(*depth / views.points[k]->z());
   }
   std::sort(lengths.begin(), lengths.end());
   return lengths;
