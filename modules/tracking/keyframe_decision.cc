@@ -66,7 +66,6 @@ double KeyframeDecision::NextShare(double share, int64_t utime_us, int64_t frame
 // The turn since the reference, taken one frame ahead.
 bool KeyframeDecision::TurnsAway(const TrackedFrame& frame, const Rigid3& world_from_reference,
                                  int64_t frame_interval_us) const {
-  if (frame.view->baseline_m() > 0.0) return false;
   const CameraCalibration& camera = frame.view->calibration();
   const double field_of_view_rad = 2.0 * std::atan(0.5 * camera.width_px / camera.fx_px);
   const double turn_rad = LogSO3(world_from_reference.rotation.conjugate() * frame.world_from_camera.rotation).norm();
