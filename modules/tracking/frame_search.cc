@@ -24,6 +24,10 @@ constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
 // the open, where points fade from frame to frame, no other try is better.
 constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
 
+// Points of measured depth that agree with a pose by chance, as a wall does, are fewer; two frames by themselves, which
+// take ten times as long as all the tries, know no more than so many.
+constexpr int kFewWithDepth = 100;
+
 // What the essential matrix of two frames may be off by, and a wall seen one window too far is not.
 constexpr double kMaxTurnFromPair_rad = 0.035;
 
@@ -51,7 +55,8 @@ std::optional<FoundFrame> FrameSearch::Follow() {
     const std::optional<FoundFrame>& found = FindAnywhere();
     is_clear = found && TryAt(found->frame.world_from_camera, 1.0, nullptr, best);
   }
-  if (!is_clear) is_clear = PoseByPair() && TryAt(*PoseByPair(), 1.0, nullptr, best);
+  const bool are_few = view_->baseline_m() == 0.0 || best.num_inliers < kFewWithDepth;
+  if (!is_clear && are_few) is_clear = PoseByPair() && TryAt(*PoseByPair(), 1.0, nullptr, best);
   if (best.num_inliers < options_.min_last_matches / 2) return std::nullopt;
   const bool is_wide = (is_clear && best.num_tries > 1) || IsWide(*best.frame);
   return FoundFrame{std::move(*best.frame), is_wide, !is_clear};

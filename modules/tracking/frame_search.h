@@ -25,7 +25,7 @@ struct ExpectedFrame {
   Rigid3 world_from_camera;
   std::optional<DirectionPrior>
       way;                         // from the last frame, whatever the turn, world units; nullopt: no motion is known
-  std::optional<PosePrior> prior;  // how well the position is known, if the motion was steady
+  std::optional<PosePrior> prior;  // how well the position is known, if the camera was watched for long enough
   double turn_sigma_rad = 0.0;     // how well the turn is, an axis
 };
 
@@ -54,7 +54,7 @@ class FrameSearch {
   std::optional<FoundFrame> Follow();
   // Without an expected pose: the points around the last frame, matched by descriptor alone. Computed once.
   const std::optional<FoundFrame>& FindAnywhere();
-  // Mono: where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
+  // Where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
   // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points
   // agree with a pose: on a wall or a fence they do so in several places. False where the turn was known beforehand to

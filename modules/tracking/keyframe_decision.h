@@ -23,8 +23,9 @@ struct KeyframeDecisionOptions {
   double min_first_share = 0.4;
   double min_parallax_rad =
       0.035;  // mono: 2 degrees of median parallax to the reference: new points can be triangulated well
-  // Mono: and the camera must not turn by more than this share of its field of view: what comes into view at the next
-  // frame is known only if this one and the reference both see it.
+  // And the camera must not turn by more than this share of its field of view. Mono knows what comes into view at the
+  // next frame only if this one and the reference both see it; with depth, what is left in view lies at one side of the
+  // image, where a turn looks like a step aside.
   double max_turn_share = 0.4;
   double min_still_share = 0.9;       // few points, parallax or age is no reason while more than this is still seen
   int min_points = 150;               // a frame that sees fewer known points becomes a keyframe if anything moved

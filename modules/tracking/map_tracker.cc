@@ -26,6 +26,8 @@ constexpr int kFewInliers = 100;         // that agree with a pose: what two fra
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // Where depth is measured, no scale can slip, and a hand jerks: what moves the image by less than this is no doubt.
 constexpr double kMinDoubtfulShift_px = 10.0;
+// What a camera that stood goes until the next frame, in the image: a standard deviation.
+constexpr double kStart_px = 1.0;
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
 
@@ -301,7 +303,7 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
     const double way = motion->last_from_current.translation.norm();
     const double direction_sigma_rad = std::sqrt(motion->covariance.trace() / 3.0) / way;
     expected.way = {world_from_reference.scale * SinceLast(view) * motion_.velocity(), direction_sigma_rad};
-    expected.prior = PriorOf(*motion);
+    if (motion->is_learned) expected.prior = PriorOf(*motion);
     expected.turn_sigma_rad = motion->turn_sigma_rad;
   }
   return expected;
@@ -382,24 +384,28 @@ double MapTracker::SinceLast(const FrameView& view) const { return SecondsBetwee
 
 Sim3 MapTracker::WorldFromReference() const { return replica_.WorldFromKeyframe(reference_).value_or(Sim3{}); }
 
-// Where the motion of a moment ago takes the camera; nullopt: nothing that could be held against images.
-std::optional<PosePrior> MapTracker::PriorOf(const MotionPrediction& motion) const {
-  if (!motion.is_steady) return std::nullopt;
+// Where the motion of a moment ago takes the camera. One that stands may start.
+PosePrior MapTracker::PriorOf(const MotionPrediction& motion) const {
   const Sim3 world_from_reference = WorldFromReference();
-  const double area = world_from_reference.scale * world_from_reference.scale;
   const Rigid3 reference_from_expected = last_->reference_from_camera * motion.last_from_current;
-  return PosePrior{(world_from_reference * reference_from_expected).Pose().Inverse(),
-                   (motion.covariance * area).inverse()};
+  Eigen::Matrix3d covariance = motion.covariance * (world_from_reference.scale * world_from_reference.scale);
+  if (!motion.is_steady) {
+    const double start = kStart_px * last_->frame.MedianDepth() / last_->frame.view->calibration().fx_px;
+    covariance += start * start * Eigen::Matrix3d::Identity();
+  }
+  return {(world_from_reference * reference_from_expected).Pose().Inverse(), covariance.inverse()};
 }
 
 // By the images alone where they fix how far the camera went, else carried by how it moved a moment ago. Which points
 // are outliers is told with the motion: wrong matches that agree on another one can't win.
 MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
   const std::optional<MotionPrediction> motion = lost_since_us_ ? std::nullopt : PredictMotion(*frame.view);
-  const std::optional<PosePrior> prior = motion ? PriorOf(*motion) : std::nullopt;
-  if (!prior) return {OptimizeByConfirmed(replica_, options_.search.pose, nullptr, frame), StepEvidence::kStrong};
+  if (!motion || !motion->is_learned) {
+    return {OptimizeByConfirmed(replica_, options_.search.pose, nullptr, frame), StepEvidence::kStrong};
+  }
+  const PosePrior prior = PriorOf(*motion);
   TrackedFrame carried = frame;
-  const PoseOptimizationResult with_motion = OptimizeByConfirmed(replica_, options_.search.pose, &*prior, carried);
+  const PoseOptimizationResult with_motion = OptimizeByConfirmed(replica_, options_.search.pose, &prior, carried);
   TrackedFrame seen = carried;
   PoseOptimizationResult by_images = OptimizeByConfirmed(replica_, options_.search.pose, nullptr, seen);
   // Unless most points contradict the motion: the camera may have been carried away. That is told, not overruled.

@@ -137,7 +137,7 @@ class MapTracker {
   Sim3 WorldFromReference() const;                // identity before there is a reference
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
-  std::optional<PosePrior> PriorOf(const MotionPrediction& motion) const;
+  PosePrior PriorOf(const MotionPrediction& motion) const;
   bool IsDoubtful(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
   bool IsWayOpen(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
   MotionPrior ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const;
@@ -176,14 +176,13 @@ class MapTracker {
   // By point: its own, or those of the first frame tracked from it.
   std::optional<PoseInfluences> reference_influences_;
   WayCorrections way_corrections_;
-  std::optional<TrackedFrame>
-      reference_frame_;            // mono: as it was when it became a keyframe; nullopt: it is the map's alone
-  Rigid3 world_from_start_;        // camera where the next part of the map begins
-  std::optional<Drift> drift_;     // of the last loss
-  ScaleWatch scale_;               // mono
-  GroundWatch ground_;             // mono; in units of the world
-  int64_t previous_utime_us_ = 0;  // of the frame before
-  std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
+  std::optional<TrackedFrame> reference_frame_;  // as it was when it became a keyframe; nullopt: it is the map's alone
+  Rigid3 world_from_start_;                      // camera where the next part of the map begins
+  std::optional<Drift> drift_;                   // of the last loss
+  ScaleWatch scale_;                             // mono
+  GroundWatch ground_;                           // mono; in units of the world
+  int64_t previous_utime_us_ = 0;                // of the frame before
+  std::optional<int64_t> tracked_utime_us_;      // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last
 };

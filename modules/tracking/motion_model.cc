@@ -83,7 +83,8 @@ std::optional<MotionPrediction> MotionModel::Predict(double interval_s,
   prediction.covariance = last_from_middle * variance * last_from_middle.transpose() * (interval_s * interval_s);
   const double squared = velocity_.squaredNorm();
   const double along = velocity_.dot(variance * velocity_);  // |v|^2 times the variance along v
-  prediction.is_steady = num_motions_ >= kMinMotions && squared * squared > kMinSteadiness * kMinSteadiness * along;
+  prediction.is_learned = num_motions_ >= kMinMotions;
+  prediction.is_steady = prediction.is_learned && squared * squared > kMinSteadiness * kMinSteadiness * along;
   return prediction;
 }
 

@@ -26,7 +26,8 @@ namespace tessera {
 struct MotionPrediction {
   Rigid3 last_from_current;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of its translation
-  bool is_steady = false;       // enough was seen of a moving camera to hold this against images
+  bool is_learned = false;                               // enough was seen to say where to look
+  bool is_steady = false;       // and of a moving camera, to hold this against images: one that stands may start
   double turn_sigma_rad = 0.0;  // of its rotation, an axis, if the camera turns on as it did
 };
 

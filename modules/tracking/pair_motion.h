@@ -19,7 +19,7 @@ struct PairMotionOptions {
                           .min_parallax_rad = 0.005,
                           .min_rival_z = 0.0,
                           .max_direction_sigma_rad = 0.03};
-  int min_known_points = 8;        // whose depth tells the length of the step
+  int min_known_points = 8;        // of known depth, which tells the length of the step
   double max_depth_spread = 0.25;  // half of them must agree on it within this share
   double min_cos_expected = 0.8;   // without them: between the step and the expected one
   // Where the motion so far helps to tell turning from moving aside: how well the direction must be known then, and how
@@ -31,10 +31,11 @@ struct PairMotionOptions {
 };
 
 // last_from_current, in world units: rotation and direction from the essential matrix (EstimateTwoView), the length as
-// the known points that `last` sees have it: the median over them of their depth by the depth of unit length. Where
-// they are too few or disagree, the length of `expected`, the way by the motion so far, if the direction is about that
-// one's. nullopt if there is neither, or the motion is not determined. The two views need not do that by themselves:
-// walls at either side of a corner leave open how much of a step is a turn, by more than `expected` does.
+// the known points that `last` sees have it, and the depths that it measured itself: the median over them of their
+// depth by the depth of unit length. Where they are too few or disagree, the length of `expected`, the way by the
+// motion so far, if the direction is about that one's. nullopt if there is neither, or the motion is not determined.
+// The two views need not do that by themselves: walls at either side of a corner leave open how much of a step is a
+// turn, by more than `expected` does.
 //
 // A rival motion doesn't refuse it, as it does at the start: the known points or the motion so far confirm the best
 // one.

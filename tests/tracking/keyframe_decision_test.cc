@@ -113,7 +113,7 @@ TEST_F(Decision, ParallaxIsAReasonForMonoAlone) {
   EXPECT_TRUE(Ask(Frame(10, 0, kNumPoints * 88 / 100, 0.5)));
 }
 
-TEST_F(Decision, MonoKeepsAFrameBeforeItTurnsAwayFromTheReference) {
+TEST_F(Decision, AKeyframeBeforeTheCameraTurnsAwayFromTheReference) {
   const auto after_turn = [&](SensorType sensor, double turn_rad) {
     calibration_ = SyntheticWorld(sensor, 0.0, 0).calibration();
     Start();
@@ -122,9 +122,10 @@ TEST_F(Decision, MonoKeepsAFrameBeforeItTurnsAwayFromTheReference) {
     return Ask(frame);
   };
   const double field_of_view_rad = 2.0 * std::atan(0.5 * calibration_.width_px / calibration_.fx_px);
-  EXPECT_FALSE(after_turn(SensorType::kMono, 0.19 * field_of_view_rad));
-  EXPECT_TRUE(after_turn(SensorType::kMono, 0.21 * field_of_view_rad)) << "as far again makes more than two fifths";
-  EXPECT_FALSE(after_turn(SensorType::kStereo, 0.21 * field_of_view_rad));
+  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
+    EXPECT_FALSE(after_turn(sensor, 0.19 * field_of_view_rad));
+    EXPECT_TRUE(after_turn(sensor, 0.21 * field_of_view_rad)) << "as far again makes more than two fifths";
+  }
 }
 
 TEST_F(Decision, ManyNewNearKeypointsAndFewKnownOnesMakeAKeyframe) {

@@ -61,6 +61,7 @@ TEST(MapTracker, FollowsAStereoDrive) {
 }
 
 // Steps of a meter where nothing is near: the farthest points are all that hold the camera.
+// Without far points, the two frames by themselves show the way, and become keyframes.
 TEST(MapTracker, FollowsWhatIsFarWhereNothingIsNear) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
   for (const int min_points : {0, DepthPointOptions{}.min_points}) {
@@ -69,7 +70,8 @@ TEST(MapTracker, FollowsWhatIsFarWhereNothingIsNear) {
     const MapTrackingResult first = tracker.Track(world.Take(0).features);
     ASSERT_EQ(first.pose.state, TrackingState::kTracked);
     const MapTrackingResult second = tracker.Track(world.Take(1).features);
-    EXPECT_EQ(second.pose.state == TrackingState::kTracked, min_points > 0);
+    EXPECT_EQ(second.pose.state, TrackingState::kTracked);
+    EXPECT_EQ(second.keyframes.empty(), min_points > 0);
   }
 }
 
@@ -147,6 +149,24 @@ TEST(MapTracker, FollowsMonoThroughWideStepsAndTurns) {
     for (const KeyframeObservation& keyframe : result.keyframes) {
       time.KeyframeSent(keyframe.id, features.frame, 0);
       time.Receive(std::make_shared<const MapDelta>(mapper.Process(keyframe)));
+    }
+  }
+}
+
+TEST(MapTracker, FollowsACameraThatHasStoodForAWhile) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  Mapper mapper{MapperOptions{}};
+  const std::vector<double> steps = {0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5};
+  double way = 0.0;
+  for (int64_t frame = 0; frame < 22; ++frame) {
+    if (frame >= 15) way += steps[static_cast<size_t>(frame - 15)];
+    const Rigid3 truth{Eigen::Quaterniond::Identity(), {0.0, 0.0, way}};
+    const MapTrackingResult result = tracker.Track(world.Take(frame, truth).features);
+    ASSERT_EQ(result.pose.state, TrackingState::kTracked) << way;
+    EXPECT_THAT(result.pose.world_from_camera, IsNear(truth, 0.03));
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
     }
   }
 }

@@ -118,6 +118,12 @@ TEST(MotionModel, IsSteadyOnceItHasSeenEnoughOfAMovingCamera) {
   EXPECT_FALSE(Driven(0.0).Predict(kInterval)->is_steady);  // a camera that stands may start at any time
 }
 
+TEST(MotionModel, SaysWhereToLookOnceItHasSeenEnoughOfACamera) {
+  EXPECT_TRUE(Driven(0.5).Predict(kInterval)->is_learned);
+  EXPECT_TRUE(Driven(0.0).Predict(kInterval)->is_learned);
+  EXPECT_FALSE(Driven(0.0, 1e-3, 5).Predict(kInterval)->is_learned);
+}
+
 TEST(MotionModel, ForgetsWhenReset) {
   MotionModel model = Driven(0.5);
   model.Reset();
@@ -131,7 +137,7 @@ class JudgeTest : public testing::Test {
   }
   static Rigid3 Step(double along) { return {Eigen::Quaterniond::Identity(), {0.0, 0.0, along}}; }
 
-  MotionPrediction prediction_{Step(1.0), Covariance(0.01, 0.01), true};
+  MotionPrediction prediction_{Step(1.0), Covariance(0.01, 0.01), true, true};
 };
 
 TEST_F(JudgeTest, StrongImagesAreBelieved) {

@@ -37,6 +37,15 @@ TEST_F(PairMotion, WithoutKnownPointsTheExpectedStepTellsIt) {
   EXPECT_GT(motion->translation.normalized().dot(last_from_current_.translation.normalized()), 0.99);
 }
 
+TEST_F(PairMotion, MeasuredDepthsTellItsLengthWherePointsAreUnknown) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  const TrackedFrame last = KnowsFirst(world.TrackedAt(0), 0);
+  const auto current = ViewOf(world.Take(1, last.world_from_camera * last_from_current_).features);
+  const auto motion = EstimatePairMotion(last, *current, std::nullopt, {});
+  ASSERT_TRUE(motion.has_value());
+  EXPECT_THAT(*motion, IsNear(last_from_current_, 0.1));
+}
+
 TEST_F(PairMotion, IsUnknownIfItsLengthIsOrItGoesElsewhereThanExpected) {
   const TrackedFrame unknown = KnowsFirst(last_, 0);
   EXPECT_FALSE(EstimatePairMotion(unknown, *current_, std::nullopt, {}).has_value());
