@@ -375,25 +375,28 @@ MapTracker::Frame MapTracker::Unrolled(const Frame& rolled, const TrackedFrame& 
   return std::make_shared<const FrameView>(Unroll(rolled->features(), depths, readout_.readout_s(), *motion));
 }
 
+// One that stands may start.
 std::optional<MotionPrediction> MapTracker::PredictMotion(const FrameView& view) const {
   const double interval_s = SinceLast(view);
-  return interval_s > 0.0 ? motion_.Predict(interval_s) : std::nullopt;
+  std::optional<MotionPrediction> motion = interval_s > 0.0 ? motion_.Predict(interval_s) : std::nullopt;
+  if (motion && motion->is_learned && !motion->is_steady) {
+    const double depth = last_->frame.MedianDepth() / WorldFromReference().scale;
+    const double start = kStart_px * depth / view.calibration().fx_px;
+    motion->covariance += start * start * Eigen::Matrix3d::Identity();
+  }
+  return motion;
 }
 
 double MapTracker::SinceLast(const FrameView& view) const { return SecondsBetween(*last_->frame.view, view); }
 
 Sim3 MapTracker::WorldFromReference() const { return replica_.WorldFromKeyframe(reference_).value_or(Sim3{}); }
 
-// Where the motion of a moment ago takes the camera. One that stands may start.
+// Where the motion of a moment ago takes the camera.
 PosePrior MapTracker::PriorOf(const MotionPrediction& motion) const {
   const Sim3 world_from_reference = WorldFromReference();
+  const double area = world_from_reference.scale * world_from_reference.scale;
   const Rigid3 reference_from_expected = last_->reference_from_camera * motion.last_from_current;
-  Eigen::Matrix3d covariance = motion.covariance * (world_from_reference.scale * world_from_reference.scale);
-  if (!motion.is_steady) {
-    const double start = kStart_px * last_->frame.MedianDepth() / last_->frame.view->calibration().fx_px;
-    covariance += start * start * Eigen::Matrix3d::Identity();
-  }
-  return {(world_from_reference * reference_from_expected).Pose().Inverse(), covariance.inverse()};
+  return {(world_from_reference * reference_from_expected).Pose().Inverse(), (motion.covariance * area).inverse()};
 }
 
 // By the images alone where they fix how far the camera went, else carried by how it moved a moment ago. Which points

@@ -1,5 +1,6 @@
 #include "tracking/motion_model.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,10 @@ constexpr double kMinSteadiness = 5.0;  // |v| in standard deviations: a camera 
 constexpr double kWeakShare = 0.2;      // of the step
 constexpr double kMaxSigmas = 5.0;
 constexpr double kMinShare = 0.7, kMaxShare = 1.4;  // of the predicted length
+
+double LargestEigenvalue(const Eigen::Matrix3d& symmetric) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly).eigenvalues().z();
+}
 
 }  // namespace
 
@@ -89,7 +94,11 @@ std::optional<MotionPrediction> MotionModel::Predict(double interval_s,
 }
 
 StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, const Eigen::Matrix3d& covariance) {
-  if (!prediction.is_steady) return StepEvidence::kStrong;
+  if (!prediction.is_learned) return StepEvidence::kStrong;
+  if (!prediction.is_steady) {
+    const bool is_open = LargestEigenvalue(covariance) > LargestEigenvalue(prediction.covariance);
+    return is_open ? StepEvidence::kWeak : StepEvidence::kStrong;
+  }
   const Eigen::Vector3d& step = prediction.last_from_current.translation;
   const double squared = step.squaredNorm();
   if (step.dot(covariance * step) > kWeakShare * kWeakShare * squared * squared) return StepEvidence::kWeak;

@@ -70,8 +70,9 @@ class MotionModel {
 
 // What images say about a step against what was predicted.
 enum class StepEvidence {
-  kStrong,        // they fix the step, or nothing steady was predicted
-  kWeak,          // they leave its length open: a standard deviation along it of more than a fifth of it
+  kStrong,  // they fix the step, or nothing steady was predicted
+  kWeak,    // they leave its length open: a standard deviation along it of more than a fifth of it; or, of a camera
+            // that stands, where it is, more than the prediction does
   kContradictory  // they fix another step, which a camera that moved as this one did a moment ago can't make
 };
 

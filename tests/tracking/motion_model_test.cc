@@ -156,8 +156,14 @@ TEST_F(JudgeTest, ASixthOfTheSpeedFromOneFrameToTheNextIsAContradiction) {
   EXPECT_EQ(Judge(prediction_, Step(-0.5), Covariance(0.01, 0.01)), StepEvidence::kContradictory);
 }
 
-TEST_F(JudgeTest, OfAnUnsteadyCameraImagesAloneKnow) {
+TEST_F(JudgeTest, OfACameraThatStandsImagesKnowMoreUnlessTheyLeaveMoreOpen) {
   prediction_.is_steady = false;
+  EXPECT_EQ(Judge(prediction_, Step(1.0 / 6.0), Covariance(0.009, 0.009)), StepEvidence::kStrong);
+  EXPECT_EQ(Judge(prediction_, Step(1.0 / 6.0), Covariance(0.009, 0.3)), StepEvidence::kWeak);
+}
+
+TEST_F(JudgeTest, OfACameraThatWasHardlySeenImagesAloneKnow) {
+  prediction_.is_learned = prediction_.is_steady = false;
   EXPECT_EQ(Judge(prediction_, Step(1.0 / 6.0), Covariance(0.01, 0.3)), StepEvidence::kStrong);
 }
 
