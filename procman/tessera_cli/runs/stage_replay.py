@@ -8,6 +8,7 @@ import re
 import tempfile
 import time
 from argparse import Namespace
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -35,7 +36,8 @@ STAGES = ("extractor", "tracker", "mapper", "loop_closer", "global_adjuster")
 ONLY_FOR = {"CAMERA": "dispatcher", "TILE": "extractor", "TILE_FEATURES": "reassembler"}
 # When these are said depends on time, or on what was lost on the way.
 NOT_COMPARED = (STATUS, HEARTBEAT, REPAIR, "EXTRACTOR_READY", "TILE_ACK", "MAP_REQUEST", "MAP_SNAPSHOT")
-NOT_REPLAYED = (STATUS, HEARTBEAT, REPAIR)
+# A mapper that is asked for the map says its last deltas again, which is no difference either.
+NOT_REPLAYED = (STATUS, HEARTBEAT, REPAIR, "MAP_REQUEST")
 # For measuring only, or different in each life of a process.
 MEASURED_FIELDS = ("header", "captured", "latency", "map_wait_us")
 # The recorder may have heard an answer before the question: after so long without an answer, the next is asked.
@@ -62,7 +64,7 @@ class Recording:
 
 def read_recording(log: Path, stage: str, prefix: str) -> Recording:
     """Raises UserError if the log does not tell all that the stage said in one life."""
-    recording, lives = Recording(), set[int]()
+    recording, lives, num_said, last_delta = Recording(), set[int](), Counter[str](), (-1, -1)
     for event in read_log(log):
         header, channel = header_of(event.data), event.channel.removeprefix(prefix)
         if header is None or channel in NOT_REPLAYED or not event.channel.startswith(prefix):
@@ -74,10 +76,17 @@ def read_recording(log: Path, stage: str, prefix: str) -> Recording:
                 recording.input_by_number[channel, header.publisher, header.epoch_us, header.sequence] = event
         elif channel not in NOT_COMPARED:
             lives.add(header.epoch_us)
-            said = recording.outputs.setdefault(channel, [])
-            if header.sequence != len(said):
-                raise UserError(f"{log} lacks message {len(said)} of {stage} on {channel}: record the run again.")
-            said.append(event.data)
+            if header.sequence != num_said[channel]:
+                raise UserError(
+                    f"{log} lacks message {num_said[channel]} of {stage} on {channel}: record the run again."
+                )
+            num_said[channel] += 1
+            if channel == "MAP_DELTA":
+                delta = (getattr(receive_logged(event.data), "number", 0), header.part)
+                if delta <= last_delta:
+                    continue
+                last_delta = delta
+            recording.outputs.setdefault(channel, []).append(event.data)
             recording.num_outputs += 1
     if not recording.outputs:
         raise UserError(f"{log} has nothing that {stage} said: record the whole stack, by tessera run --record.")
