@@ -20,12 +20,12 @@ namespace {
 // points, agree with it. At usual steps 0.77 and 0.44 is the least that was seen (KITTI 03); walls and fences seen one
 // window too far gave up to 0.66 and 0.37.
 constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
-// Or if a steady motion knew, to this standard deviation, where points are seen, and the camera turned as predicted. In
-// the open, where points fade from frame to frame, no other try is better.
+// Or if the motion so far knew, to this standard deviation, where points are seen, and the camera turned as predicted.
+// In the open, where points fade from frame to frame, no other try is better.
 constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
 
-// Points of measured depth that agree with a pose by chance, as a wall does, are fewer; two frames by themselves, which
-// take ten times as long as all the tries, know no more than so many.
+// With depth, two frames by themselves are asked only where fewer points agree: that takes ten times as long as all the
+// tries, and more points are hardly wrong by chance.
 constexpr int kFewWithDepth = 100;
 
 // What the essential matrix of two frames may be off by, and a wall seen one window too far is not.
@@ -80,7 +80,7 @@ bool FrameSearch::PairContradicts(const Rigid3& world_from_camera) {
   return by_pair && TurnBetween(*by_pair, world_from_camera) > kMaxTurnFromPair_rad;
 }
 
-// Whether a steady motion knew where the last frame's points are seen, and the camera turned as predicted.
+// Whether the motion so far knew where the last frame's points are seen, and the camera turned as predicted.
 bool FrameSearch::IsAsExpected(const Rigid3& world_from_camera) const {
   return expected_.prior && TurnBetween(expected_.world_from_camera, world_from_camera) < kMaxTurnFromPrediction_rad &&
          ExpectedSigma_px() < kMaxPriorSigma_px;

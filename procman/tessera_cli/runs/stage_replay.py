@@ -81,8 +81,8 @@ def read_recording(log: Path, stage: str, prefix: str) -> Recording:
                     f"{log} lacks message {num_said[channel]} of {stage} on {channel}: record the run again."
                 )
             num_said[channel] += 1
-            if channel == "MAP_DELTA":
-                delta = (getattr(receive_logged(event.data), "number", 0), header.part)
+            if channel == "MAP_DELTA" and (message := receive_logged(event.data)) is not None:
+                delta = (message.number, header.part)
                 if delta <= last_delta:
                     continue
                 last_delta = delta
