@@ -7,9 +7,9 @@ import pytest
 
 from helpers.recorded_log import message_of
 from helpers.stack import Finished, Tessera
-from tessera_cli.lcm_bus import read_log, write_log
+from tessera_cli.lcm_bus import LoggedEvent, read_log, write_log
 from tessera_cli.messages import receive_logged
-from tessera_cli.runs.stage_replay import compare
+from tessera_cli.runs.stage_replay import compare, read_recording
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +80,35 @@ def test_one_bit_is_a_difference_and_times_of_measuring_are_none() -> None:
     assert compare(before.encode(), after.encode()) == (
         "of frame 7: world_from_camera.translation[1] was 0.0 and is 5e-324"
     )
+
+
+def deltas_said(*numbers_and_parts: tuple[int, int]) -> list[LoggedEvent]:
+    """By a mapper, one after the other."""
+    events = []
+    for sequence, (number, part) in enumerate(numbers_and_parts):
+        delta = message_of("map_delta_t", number=number)
+        delta.header.publisher, delta.header.sequence = "mapper", sequence
+        delta.header.part, delta.header.num_parts = part, 2
+        events.append(LoggedEvent(sequence, "MAP_DELTA", delta.encode()))
+    return events
+
+
+def test_deltas_that_are_said_again_are_no_difference(tmp_path: Path) -> None:
+    """A follower that starts late asks for the map; the mapper then says its last deltas again, in all their parts."""
+    events = deltas_said((0, 0), (0, 1), (1, 0), (1, 1), (0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1))
+    write_log(tmp_path / "again.lcmlog", events)
+    recording = read_recording(tmp_path / "again.lcmlog", "mapper", "")
+    assert recording.outputs == {"MAP_DELTA": [event.data for event in events[:4] + events[8:]]}
+    assert recording.num_outputs == 6
+
+
+def test_a_delta_that_does_not_decode_is_compared(tmp_path: Path) -> None:
+    events = deltas_said((0, 0), (0, 1), (1, 0))
+    cut = replace(events[1], data=events[1].data[:-8])
+    assert receive_logged(cut.data) is None
+    write_log(tmp_path / "cut.lcmlog", [events[0], cut, events[2]])
+    recording = read_recording(tmp_path / "cut.lcmlog", "mapper", "")
+    assert recording.outputs == {"MAP_DELTA": [events[0].data, cut.data, events[2].data]}
 
 
 def test_logs_that_do_not_tell_are_refused(tessera: Tessera, recorded: Path, tmp_path: Path) -> None:
