@@ -89,9 +89,13 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
     return;
   }
   const double number = ParseNumber(key, value);
-  const std::map<std::string, double*> numbers{{"length", &options.length_m}, {"duration", &options.duration_s},
-                                               {"speed", &options.speed},     {"noise", &options.noise},
-                                               {"scale", &options.scale},     {"readout", &options.readout_ms}};
+  const std::map<std::string, double*> numbers{{"length", &options.length_m},
+                                               {"duration", &options.duration_s},
+                                               {"speed", &options.speed},
+                                               {"noise", &options.noise},
+                                               {"scale", &options.scale},
+                                               {"readout", &options.readout_ms},
+                                               {"depth_delay", &options.depth_delay_ms}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
@@ -99,7 +103,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
   } else {
     throw InputError("sim: `" + key + "=" + value +
                      "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-                     "speed, noise, scale or path");
+                     "depth_delay (ms), speed, noise, scale or path");
   }
 }
 
@@ -113,6 +117,9 @@ Result<> SimulationOptions::Check() const {
   if (!(scale >= 0.1 && scale <= 4.0)) return Failed("sim: scale must be between 0.1 and 4 times the usual");
   if (!(readout_ms == -1.0 || (readout_ms >= 0.0 && readout_ms <= 100.0))) {
     return Failed("sim: readout must be between 0 and 100 ms");
+  }
+  if (!(depth_delay_ms >= -100.0 && depth_delay_ms <= 100.0)) {
+    return Failed("sim: depth_delay must be between -100 and 100 ms");
   }
   return {};
 }
@@ -204,22 +211,26 @@ CameraVelocity Simulation::VelocityAt(double time_s) const {
   return {step.translation / (2.0 * kStepS), 2.0 * step.rotation.vec() / (2.0 * kStepS)};
 }
 
-Rigid3 Simulation::WorldFromCameraAtRow(FrameId frame, double row) const {
+Rigid3 Simulation::WorldFromCameraAt(double time_s, double row) const {
   const double part = (row + 0.5) / camera_.height_px - 0.5;
-  return trajectory_->WorldFromCamera(TimeOf(frame) + part * readout_s_);
+  return trajectory_->WorldFromCamera(time_s + part * readout_s_);
 }
 
-void Simulation::RenderEye(FrameId frame, double right_m, Rendering& out) {
+Rigid3 Simulation::WorldFromCameraAtRow(FrameId frame, double row) const {
+  return WorldFromCameraAt(TimeOf(frame), row);
+}
+
+void Simulation::RenderEye(double time_s, double right_m, Rendering& out) {
   const Rigid3 left_from_eye{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}};
   if (readout_s_ == 0.0) {
-    renderer_->Render(camera_, WorldFromCamera(frame) * left_from_eye, TimeOf(frame), out);
+    renderer_->Render(camera_, trajectory_->WorldFromCamera(time_s) * left_from_eye, time_s, out);
     return;
   }
-  const auto world_from_eye = [&](double row) { return WorldFromCameraAtRow(frame, row) * left_from_eye; };
-  renderer_->RenderRolling(camera_, world_from_eye, TimeOf(frame), out);
+  const auto world_from_eye = [&](double row) { return WorldFromCameraAt(time_s, row) * left_from_eye; };
+  renderer_->RenderRolling(camera_, world_from_eye, time_s, out);
 }
 
-void Simulation::RenderPerfect(FrameId frame, Rendering& out) { RenderEye(frame, 0.0, out); }
+void Simulation::RenderPerfect(FrameId frame, Rendering& out) { RenderEye(TimeOf(frame), 0.0, out); }
 
 CameraFrame Simulation::Render(FrameId id) {
   const double time = TimeOf(id);
@@ -229,9 +240,12 @@ CameraFrame Simulation::Render(FrameId id) {
   frame.id = id;
   frame.utime_us = UtimeOf(id);
   frame.sensor = camera_.sensor;
-  RenderEye(id, 0.0, rendering_);
+  RenderEye(time, 0.0, rendering_);
   frame.left = effects_->Apply(rendering_, velocity, time, picture);
   if (camera_.sensor == SensorType::kRgbd) {
+    if (options_.depth_delay_ms != 0.0) {
+      RenderEye(time + 0.001 * options_.depth_delay_ms, 0.0, rendering_);
+    }
     if (options_.scene == Scene::kDesk) {
       DepthSensor sensor;
       sensor.disparity_noise_px *= options_.noise;
@@ -240,7 +254,7 @@ CameraFrame Simulation::Render(FrameId id) {
       frame.depth = effects_->Depth(rendering_, picture);
     }
   } else if (camera_.sensor == SensorType::kStereo) {
-    RenderEye(id, camera_.baseline_m, rendering_);
+    RenderEye(time, camera_.baseline_m, rendering_);
     frame.right = effects_->Apply(rendering_, velocity, time, picture + 1);
   }
   return frame;

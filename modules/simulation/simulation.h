@@ -16,14 +16,15 @@ namespace tessera {
 struct SimulationOptions {
   enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk, kDesk, kRobot };
   Scene scene = Scene::kStreet;
-  uint32_t seed = 1;         // another seed, another town
-  double length_m = 0.0;     // of a drive; 0: all of it
-  double duration_s = 20.0;  // of the hand's way in the room or at the desk
-  double speed = 1.0;        // times the usual
-  double noise = 1.0;        // times the usual noise of sensors
-  double scale = 1.0;        // times the usual size of images
-  double readout_ms = -1.0;  // rolling shutter: from the first row to the last; -1: that of the world's camera
-  std::string path;          // a drive along the poses of a KITTI file instead of through the town
+  uint32_t seed = 1;            // another seed, another town
+  double length_m = 0.0;        // of a drive; 0: all of it
+  double duration_s = 20.0;     // of the hand's way in the room or at the desk
+  double speed = 1.0;           // times the usual
+  double noise = 1.0;           // times the usual noise of sensors
+  double scale = 1.0;           // times the usual size of images
+  double readout_ms = -1.0;     // rolling shutter: from the first row to the last; -1: that of the world's camera
+  double depth_delay_ms = 0.0;  // RGB-D: depth is taken so much later than the image, as by a Kinect
+  std::string path;             // a drive along the poses of a KITTI file instead of through the town
 
   // Fails if a value is out of range.
   Result<> Check() const;
@@ -54,8 +55,9 @@ class Simulation {
  private:
   double TimeOf(FrameId frame) const;
   CameraVelocity VelocityAt(double time_s) const;
-  // The picture of the left camera, or of one this far to its right.
-  void RenderEye(FrameId frame, double right_m, Rendering& out);
+  Rigid3 WorldFromCameraAt(double time_s, double row) const;
+  // The picture of the left camera, or of one this far to its right, whose middle row is exposed at this time.
+  void RenderEye(double time_s, double right_m, Rendering& out);
 
   SimulationOptions options_;
   CameraCalibration camera_;
