@@ -99,7 +99,8 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
-  const auto view = std::make_shared<const FrameView>(WithLens(features, replica_.map().lens()));
+  const CameraView taken = Taken(features);
+  const Frame& view = taken.view;
   calibration_ = features.calibration;
   const State before = state();
   MapTrackingResult result = UndecidedResult(*view);
@@ -110,8 +111,8 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   const bool is_localized = is_answered && answer->frame == features.frame;
 
   std::optional<FrameSearch> search;
-  if (last_ && !is_localized) search.emplace(SearchFor(view));
-  if (is_localized || (search && Localize(view, *search))) {
+  if (last_ && !is_localized) search.emplace(SearchFor(taken));
+  if (is_localized || (search && Localize(taken, *search))) {
     CountPoints(result.pose);
     result.pose.is_relocalized = before == State::kLost || is_answered;
     result.pose.state = TrackingState::kTracked;
@@ -309,19 +310,19 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
   return expected;
 }
 
-FrameSearch MapTracker::SearchFor(const Frame& view) const {
-  return {Unrolled(view, TrackedFrame(view), last_->mean_motion), last_->frame, Expect(*view), replica_,
+FrameSearch MapTracker::SearchFor(const CameraView& taken) const {
+  return {AtOneTime(taken, TrackedFrame(taken.view), last_->mean_motion), last_->frame, Expect(*taken.view), replica_,
           options_.search};
 }
 
 // The frame becomes the last one if its pose can be found in the map around that one.
-bool MapTracker::Localize(const Frame& view, FrameSearch& search) {
+bool MapTracker::Localize(const CameraView& taken, FrameSearch& search) {
   std::optional<FoundFrame> found;
   if (!lost_since_us_) found = search.Follow();
   if (!found) found = search.FindAnywhere();
   if (!found) return false;
   TrackedFrame& frame = found->frame;
-  frame.view = Unrolled(view, frame, MotionOf(frame));
+  frame.view = AtOneTime(taken, frame, MotionOf(frame));
   const KnownPoints around = LocalPoints(replica_, frame, options_.search.max_local_keyframes);
   MatchLocal(around, options_.search.matching.local_radius_px, options_.search.matching, frame);
   const int min_of_last = static_cast<int>(options_.min_share_of_last * last_->frame.NumPoints());
@@ -331,7 +332,7 @@ bool MapTracker::Localize(const Frame& view, FrameSearch& search) {
   const FramePose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < min_inliers) return false;
   // Soon after a loss the greater number of inliers says as much.
-  const bool is_doubtful = lost_since_us_ ? SinceLast(*view) > kLongLost_s : found->is_doubtful;
+  const bool is_doubtful = lost_since_us_ ? SinceLast(*frame.view) > kLongLost_s : found->is_doubtful;
   if (is_doubtful && Coverage(around, frame) < kMinCoverage) return false;
   const bool are_few = pose.optimized.num_inliers < kFewInliers;
   if (!lost_since_us_ && are_few && search.PairContradicts(frame.world_from_camera)) return false;
@@ -357,22 +358,38 @@ std::optional<CameraMotion> MapTracker::MotionOf(const TrackedFrame& frame) cons
   return motion;
 }
 
-// As the keypoints would be seen if all rows were read at once, with the depths of the points that `frame` sees.
-MapTracker::Frame MapTracker::Unrolled(const Frame& rolled, const TrackedFrame& frame,
-                                       const std::optional<CameraMotion>& motion) const {
-  if (readout_.readout_s() == 0.0 || !motion) return rolled;
+MapTracker::CameraView MapTracker::Taken(const FeatureFrame& features) const {
+  CameraView taken{
+      std::make_shared<const FrameView>(WithLens(features, replica_.map().lens())), depth_delay_.delay_s(), {}};
+  if (taken.depth_delay_s != 0.0) taken.surfaces = SurfacesOf(*taken.view);
+  return taken;
+}
+
+// As the keypoints would be seen, and their depths measured, if all of it were done at the frame's time.
+MapTracker::Frame MapTracker::AtOneTime(const CameraView& taken, const TrackedFrame& frame,
+                                        const std::optional<CameraMotion>& motion) const {
+  const bool is_rolling = readout_.readout_s() > 0.0, is_late = taken.depth_delay_s != 0.0;
+  if (!motion || (!is_rolling && !is_late)) return taken.view;
+  FeatureFrame features =
+      is_late ? WithDepthsOfImage(*taken.view, taken.surfaces, taken.depth_delay_s, *motion) : taken.view->features();
+  return std::make_shared<const FrameView>(is_rolling ? Unrolled(features, frame, *motion) : std::move(features));
+}
+
+// With the depths of the points that `frame` sees, where it sees any.
+FeatureFrame MapTracker::Unrolled(const FeatureFrame& rolled, const TrackedFrame& frame,
+                                  const CameraMotion& motion) const {
   const double usual_depth = last_->frame.MedianDepth();
   const Rigid3 camera_from_world = frame.world_from_camera.Inverse();
   std::vector<double> depths(frame.points.size(), usual_depth);
   for (size_t i = 0; i < depths.size(); ++i) {
-    const double measured_m = static_cast<double>(rolled->keypoint(static_cast<int>(i)).depth_m);
+    const auto measured_m = static_cast<double>(rolled.keypoints[i].depth_m);
     if (frame.points[i].valid()) {
       depths[i] = (camera_from_world * frame.points[i].landmark.position_in_world).z();
     } else if (measured_m > 0.0) {
       depths[i] = measured_m;
     }
   }
-  return std::make_shared<const FrameView>(Unroll(rolled->features(), depths, readout_.readout_s(), *motion));
+  return Unroll(rolled, depths, readout_.readout_s(), motion);
 }
 
 // One that stands may start.
@@ -504,7 +521,7 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   WatchGround(frame, pose);
   camera_motion_ = MotionOf(frame);
   const std::optional<CameraMotion> mean_motion = MeanMotionOf(frame);
-  LearnReadout(frame);
+  LearnTimes(frame);
   lost_since_us_.reset();
   std::optional<PoseInfluences> influences = InfluencesOn(frame);
   const std::optional<Matrix6d> pose_covariance = CovarianceFromReference(frame, influences);
@@ -531,10 +548,12 @@ std::optional<Matrix6d> MapTracker::CovarianceFromReference(const TrackedFrame& 
                        frame.world_from_camera.Inverse() * WorldFromReference().Pose());
 }
 
-void MapTracker::LearnReadout(const TrackedFrame& frame) {
+void MapTracker::LearnTimes(const TrackedFrame& frame) {
   const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_);
   if (!camera_motion_ || !camera_motion_at_reference_ || !world_from_reference) return;
-  readout_.Add(frame, *camera_motion_, {world_from_reference->Pose(), *camera_motion_at_reference_});
+  const MovingView reference{world_from_reference->Pose(), *camera_motion_at_reference_};
+  readout_.Add(frame, *camera_motion_, reference);
+  depth_delay_.Add(frame, *camera_motion_, reference);
 }
 
 void MapTracker::WatchScale(const Rigid3& reference_from_camera) {

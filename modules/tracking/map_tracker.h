@@ -15,9 +15,11 @@
 
 #include "core/result.h"
 #include "geometry/pose_optimization.h"
+#include "measurement/depth_delay.h"
 #include "measurement/depth_points.h"
 #include "messages/loop_types.h"
 #include "messages/tracking_types.h"
+#include "tracking/depth_delay_estimator.h"
 #include "tracking/frame_search.h"
 #include "tracking/ground_watch.h"
 #include "tracking/initializer.h"
@@ -76,6 +78,9 @@ class MapTracker {
   // Mono: by how much the scale may have drifted since this part of the map began (ScaleWatch::drift). 0 where depth is
   // measured.
   double scale_drift() const { return scale_.drift(); }
+  // What was learned of the camera: see ReadoutEstimator, DepthDelayEstimator.
+  double readout_s() const { return readout_.readout_s(); }
+  double depth_delay_s() const { return depth_delay_.delay_s(); }
 
  private:
   using Frame = std::shared_ptr<const FrameView>;
@@ -86,6 +91,13 @@ class MapTracker {
   enum class State { kInitializing, kTracking, kLost };
   State state() const;
   bool has_map() const { return replica_.map().keyframes().size() > 0; }
+
+  // A frame as the camera took it: row after row, and its depths at another time.
+  struct CameraView {
+    Frame view;
+    double depth_delay_s = 0.0;  // by how much later; 0: too little to matter
+    DepthSurfaces surfaces;      // if it matters
+  };
 
   // What is remembered of the last tracked frame.
   struct Last {
@@ -128,12 +140,14 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
   ExpectedFrame Expect(const FrameView& view) const;
-  FrameSearch SearchFor(const Frame& view) const;
-  bool Localize(const Frame& view, FrameSearch& search);
+  FrameSearch SearchFor(const CameraView& taken) const;
+  bool Localize(const CameraView& taken, FrameSearch& search);
   std::optional<CameraMotion> MeanMotionOf(const TrackedFrame& frame) const;
   std::optional<CameraMotion> MotionOf(const TrackedFrame& frame) const;
-  Frame Unrolled(const Frame& rolled, const TrackedFrame& frame, const std::optional<CameraMotion>& motion) const;
-  void LearnReadout(const TrackedFrame& frame);
+  CameraView Taken(const FeatureFrame& features) const;
+  Frame AtOneTime(const CameraView& taken, const TrackedFrame& frame, const std::optional<CameraMotion>& motion) const;
+  FeatureFrame Unrolled(const FeatureFrame& rolled, const TrackedFrame& frame, const CameraMotion& motion) const;
+  void LearnTimes(const TrackedFrame& frame);
   Sim3 WorldFromReference() const;                // identity before there is a reference
   double SinceLast(const FrameView& view) const;  // seconds
   std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
@@ -168,6 +182,7 @@ class MapTracker {
   MotionModel motion_;                           // in the reference's units
   std::optional<MotionAt> motion_at_reference_;  // as it was when that keyframe was made
   ReadoutEstimator readout_;
+  DepthDelayEstimator depth_delay_;
   std::optional<CameraMotion> camera_motion_;  // of the last frame, while it was read; in units of the world
   std::optional<CameraMotion> camera_motion_at_reference_;  // likewise
   KeyframeId next_keyframe_{0};

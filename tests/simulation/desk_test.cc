@@ -102,6 +102,26 @@ TEST(RollingShutter, ARowIsThatOfACameraAtItsPose) {
   }
 }
 
+TEST(DepthDelay, DepthIsThatOfALaterMomentAndTheImageIsNot) {
+  Simulation simulation(ParseSimulation("desk,readout=0,noise=0"), SensorType::kRgbd);
+  Simulation late(ParseSimulation("desk,readout=0,noise=0,depth_delay=100"), SensorType::kRgbd);  // three frames
+  const CameraFrame then = simulation.Render(FrameId{40}), later = simulation.Render(FrameId{43});
+  const CameraFrame delayed = late.Render(FrameId{40});
+  EXPECT_EQ(delayed.left, then.left);
+  const auto share_equal = [&](const DepthImage& depth) {
+    int num_equal = 0, num_measured = 0;
+    for (size_t i = 0; i < depth.pixels.size(); ++i) {
+      if (depth.pixels[i] == 0 || delayed.depth.pixels[i] == 0) continue;
+      ++num_measured;
+      if (std::abs(depth.pixels[i] - delayed.depth.pixels[i]) <= 30) ++num_equal;
+    }
+    EXPECT_GT(num_measured, 100'000);
+    return static_cast<double>(num_equal) / num_measured;
+  };
+  EXPECT_GT(share_equal(later.depth), 0.95);
+  EXPECT_LT(share_equal(then.depth), 0.5);
+}
+
 TEST(Desk, MostPixelsHaveADepthThatIsThatOfTheDrawing) {
   Simulation simulation(ParseSimulation("desk"), SensorType::kRgbd);
   const CameraFrame frame = simulation.Render(FrameId{150});

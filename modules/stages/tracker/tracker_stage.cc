@@ -112,6 +112,8 @@ void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
   for (TrackerAction& action : actions) std::visit(perform, action);
   context_.SetValue("keyframes_sent", static_cast<double>(session_.num_keyframes()));
   context_.SetValue("scale_drift", session_.scale_drift());
+  context_.SetValue("readout_ms", 1e3 * session_.readout_s());
+  context_.SetValue("depth_delay_ms", 1e3 * session_.depth_delay_s());
 }
 
 void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {
