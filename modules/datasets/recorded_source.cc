@@ -158,6 +158,7 @@ std::optional<CameraFrame> RecordedSource::Next() {
   }
   if (sensor_ == SensorType::kRgbd) {
     frame.depth = ReadDepth(next_);
+    frame.depth_delay_us = recording_.depth_delays_us.at(static_cast<size_t>(next_));
   }
   ++next_;
   return frame;

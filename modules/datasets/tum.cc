@@ -94,6 +94,7 @@ void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording)
     recording.utimes_us.push_back(color[i].utime_us);
     paths.push_back(color[i].path);
     recording.depth_paths.push_back(depth[j].path);
+    recording.depth_delays_us.push_back(depth[j].utime_us - color[i].utime_us);
   }
   if (paths.empty()) {
     throw InputError("folder " + folder.string() +

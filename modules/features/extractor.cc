@@ -38,6 +38,7 @@ TileFeatures Extractor::Extract(const TileJob& job) {
                         .previous_frame = job.previous_frame,
                         .utime_us = job.utime_us,
                         .captured_us = job.captured_us,
+                        .depth_delay_us = job.depth_delay_us,
                         .tile = job.tile,
                         .num_tiles = job.num_tiles,
                         .calibration = job.calibration,

@@ -68,8 +68,9 @@ inline bool IsNearImage(const Keypoint& keypoint, const CameraCalibration& camer
 // The features of one image: keypoints[i] belongs to descriptors[i]; order fixed by (level, y, x).
 struct FeatureFrame {
   FrameId frame;
-  int64_t utime_us = 0;     // when the image was taken
-  int64_t captured_us = 0;  // the same by the host's wall clock; for measuring only
+  int64_t utime_us = 0;        // when the image was taken
+  int64_t captured_us = 0;     // the same by the host's wall clock; for measuring only
+  int64_t depth_delay_us = 0;  // RGB-D: by how much later the depths were taken, as far as the source knows
   CameraCalibration calibration;
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
@@ -87,6 +88,7 @@ struct TileJob {
   FrameId previous_frame;  // the frame before it that was not dropped; invalid: it is the first
   int64_t utime_us = 0;
   int64_t captured_us = 0;
+  int64_t depth_delay_us = 0;
   int32_t tile = 0;       // 0 .. num_tiles - 1
   int32_t num_tiles = 1;  // jobs that make up this frame
   CameraCalibration calibration;
@@ -140,6 +142,7 @@ struct TileFeatures {
   FrameId previous_frame;  // as in TileJob: the order in which frames are released
   int64_t utime_us = 0;
   int64_t captured_us = 0;
+  int64_t depth_delay_us = 0;
   int32_t tile = 0;
   int32_t num_tiles = 1;
   CameraCalibration calibration;

@@ -267,6 +267,7 @@ std::optional<Selection> SelectFeatures(const std::vector<TileFeatures>& tiles) 
   Selection selection{.features = {.frame = first.frame,
                                    .utime_us = first.utime_us,
                                    .captured_us = first.captured_us,
+                                   .depth_delay_us = first.depth_delay_us,
                                    .calibration = first.calibration,
                                    .keypoints = {},
                                    .descriptors = {}},

@@ -152,6 +152,7 @@ std::vector<TileJob> CutFrame(CameraFrame frame, const CameraCalibration& calibr
     job.frame = frame.id;
     job.utime_us = frame.utime_us;
     job.captured_us = captured_us;
+    job.depth_delay_us = frame.depth_delay_us;
     job.calibration = calibration;
     job.options = options;
     job.first_level = first_level;

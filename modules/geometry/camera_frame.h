@@ -15,6 +15,7 @@ struct CameraFrame {
   FrameId id;
   int64_t utime_us = 0;  // when it was taken, by the source's clock
   int64_t age_us = 0;  // how long ago that is, when it leaves the camera process: to measure latency, no result uses it
+  int64_t depth_delay_us = 0;  // RGB-D: by how much later `depth` was taken, as far as the source knows
   SensorType sensor = SensorType::kMono;
   GrayImage left;    // the only image of a mono or RGB-D camera
   GrayImage right;   // stereo only

@@ -95,6 +95,7 @@ DepthSurfaces SurfacesOf(const FrameView& view) {
 FeatureFrame WithDepthsOfImage(const FrameView& view, const DepthSurfaces& surfaces, double delay_s,
                                const CameraMotion& motion) {
   FeatureFrame features = view.features();
+  features.depth_delay_us = 0;
   const CameraCalibration& camera = view.calibration();
   const Rigid3 depth_from_image = Rigid3{ExpSO3(delay_s * motion.turn_rate), delay_s * motion.velocity}.Inverse();
   for (int i = 0; i < view.size(); ++i) {

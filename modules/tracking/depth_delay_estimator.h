@@ -1,4 +1,5 @@
-// How much later than the image the depths are measured (measurement/depth_delay.h), by what the images show.
+// How much later than the image the depths are measured (measurement/depth_delay.h), by what the images show; or how
+// much later than the source says.
 //
 // While the camera of a frame moves, the inverse depth that is measured at a keypoint changes by f per second
 // (InverseDepthRate), and that of the same point in the reference keyframe by f_ref, when its depth was measured there.

@@ -30,6 +30,7 @@ constexpr double kMinDoubtfulShift_px = 10.0;
 constexpr double kStart_px = 1.0;
 // Of two frames, for their poses to tell how the camera moved while an image was read.
 constexpr double kMaxFrameInterval_s = 0.07;
+constexpr double kMinDelay_s = 0.001;  // of depths: in less, a turn moves an image by less than a pixel
 
 // `are_shared`: other frames may see the same points.
 PoseInfluences ByPoint(PoseInfluences influences, bool are_shared) {
@@ -359,9 +360,12 @@ std::optional<CameraMotion> MapTracker::MotionOf(const TrackedFrame& frame) cons
 }
 
 MapTracker::CameraView MapTracker::Taken(const FeatureFrame& features) const {
-  CameraView taken{
-      std::make_shared<const FrameView>(WithLens(features, replica_.map().lens())), depth_delay_.delay_s(), {}};
-  if (taken.depth_delay_s != 0.0) taken.surfaces = SurfacesOf(*taken.view);
+  CameraView taken{std::make_shared<const FrameView>(WithLens(features, replica_.map().lens()))};
+  const double delay_s = 1e-6 * static_cast<double>(features.depth_delay_us) + depth_delay_.delay_s();
+  if (std::abs(delay_s) >= kMinDelay_s) {
+    taken.depth_delay_s = delay_s;
+    taken.surfaces = SurfacesOf(*taken.view);
+  }
   return taken;
 }
 

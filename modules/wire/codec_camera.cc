@@ -39,6 +39,7 @@ struct Layout<camera_image_t> {
     fields.Key(message.frame, frame.id);
     fields.Time(message.utime, frame.utime_us);
     fields.Time(message.age, frame.age_us);
+    fields.Time(message.depth_delay, frame.depth_delay_us);
     fields.Key(message.sensor, frame.sensor);
     fields.Key(message.width, frame.left.width);
     fields.Key(message.height, frame.left.height);

@@ -37,6 +37,7 @@ void DescribeOrigin(Fields& fields, Message& message, Value& tile) {
   fields(message.previous_frame, tile.previous_frame);
   fields.Time(message.utime, tile.utime_us);
   fields.Time(message.captured, tile.captured_us);
+  fields.Time(message.depth_delay, tile.depth_delay_us);
   fields(message.camera, tile.calibration);
   fields(message.options, tile.options);
   fields.Check(tile.previous_frame < tile.frame, "its frame number is not above that of the frame before it");

@@ -17,6 +17,7 @@ template <>
 struct Layout<features_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& frame) {
+    fields.Time(message.depth_delay, frame.depth_delay_us);
     fields(message.keypoints, frame);
   }
 };

@@ -52,10 +52,12 @@ TEST_F(TumTest, PairsImagesThatAreEachOthersNearest) {
   const auto source = OpenSource(Options());
   ASSERT_EQ(source->num_frames(), 3);
   const int64_t times_us[] = {1'000'000'000, 1'000'033'000, 1'000'100'000};
+  const int64_t depth_delays_us[] = {4'000, -3'000, -5'000};
   for (int i = 0; i < 3; ++i) {
     const auto frame = source->Next();
     EXPECT_EQ(frame->id.value, i);
     EXPECT_EQ(frame->utime_us, times_us[i]);
+    EXPECT_EQ(frame->depth_delay_us, depth_delays_us[i]);
     EXPECT_EQ(frame->left, ToGray(DatasetFolder::Pattern(640, 480, i < 2 ? i : 3)));
     EXPECT_EQ(frame->depth.row(100)[100], 1000 + i);
   }

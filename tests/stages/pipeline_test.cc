@@ -31,6 +31,7 @@ CameraFrame Frame(int64_t id) {
   CameraFrame frame;
   frame.id = {id};
   frame.utime_us = 100'000 * id;
+  frame.depth_delay_us = 1'000 * id - 2'000;
   frame.sensor = SensorType::kStereo;
   frame.left = RectanglesImage(320, 240, static_cast<unsigned>(id));
   frame.right = frame.left;
@@ -84,6 +85,7 @@ class Ends {
     for (size_t i = 0; i < expected.size(); ++i) {
       EXPECT_EQ(received_[i].frame, expected[i].frame);
       EXPECT_EQ(received_[i].keypoints, expected[i].keypoints);
+      EXPECT_EQ(received_[i].depth_delay_us, Frame(received_[i].frame.value).depth_delay_us);
       EXPECT_EQ(received_[i].descriptors, expected[i].descriptors);
       EXPECT_EQ(received_[i].calibration, kRig);
     }

@@ -62,6 +62,7 @@ CameraFrame DrawValue<CameraFrame>(std::mt19937& generator, int size) {
   const int height = size == 0 ? 1 : Draw(generator, 50, 130);
   CameraFrame frame{.id = {Draw(generator, 0, 9999)}, .utime_us = Draw(generator, 0, 1 << 30)};
   frame.sensor = static_cast<SensorType>(Draw(generator, 0, 2));
+  frame.depth_delay_us = Draw(generator, -20000, 20000);
   frame.left = DrawImage<uint8_t>(generator, width, height);
   if (frame.sensor == SensorType::kStereo) frame.right = DrawImage<uint8_t>(generator, width, height);
   if (frame.sensor == SensorType::kRgbd) frame.depth = DrawImage<uint16_t>(generator, width, height);
@@ -131,6 +132,7 @@ TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
   job.previous_frame = {job.frame.value - 1};
   job.utime_us = Draw(generator, 0, 1 << 30);
   job.captured_us = Draw(generator, 0, 1 << 30);
+  job.depth_delay_us = Draw(generator, -20000, 20000);
   job.num_tiles = Draw(generator, 1, 17);
   job.tile = job.num_tiles - 1;
   job.calibration = DrawCalibration(generator, width, height);
@@ -163,6 +165,7 @@ TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   features.previous_frame = {Draw(generator, -1, 0)};
   features.utime_us = Draw(generator, 0, 1 << 30);
   features.captured_us = Draw(generator, 0, 1 << 30);
+  features.depth_delay_us = Draw(generator, -20000, 20000);
   features.num_tiles = 3;
   features.tile = Draw(generator, 0, 2);
   features.calibration = DrawCalibration(generator, 640, 480);
@@ -222,6 +225,7 @@ FeatureFrame DrawValue<FeatureFrame>(std::mt19937& generator, int size) {
   frame.frame = {Draw(generator, 0, 9999)};
   frame.utime_us = Draw(generator, 0, 1 << 30);
   frame.captured_us = Draw(generator, 0, 1 << 30);
+  frame.depth_delay_us = Draw(generator, -20000, 20000);
   frame.calibration = DrawCalibration(generator, 1241, 376);
   const int num_keypoints = size == 0 ? 0 : Draw(generator, 100, 3000);
   for (int i = 0; i < num_keypoints; ++i) {
@@ -239,10 +243,18 @@ FeatureFrame DrawValue<FeatureFrame>(std::mt19937& generator, int size) {
 template <>
 bool AreSame(const FeatureFrame& a, const FeatureFrame& b) {
   return a.frame == b.frame && a.utime_us == b.utime_us && a.captured_us == b.captured_us &&
-         a.calibration == b.calibration && a.keypoints == b.keypoints && a.descriptors == b.descriptors;
+         a.depth_delay_us == b.depth_delay_us && a.calibration == b.calibration && a.keypoints == b.keypoints &&
+         a.descriptors == b.descriptors;
 }
 
 namespace {
+
+// Of a keyframe, whose depths are those of the image.
+FeatureFrame DrawKeyframeFeatures(std::mt19937& generator, int size) {
+  FeatureFrame features = DrawValue<FeatureFrame>(generator, size);
+  features.depth_delay_us = 0;
+  return features;
+}
 
 MotionPrior DrawMotionPrior(std::mt19937& generator) {
   MotionPrior prior{.position_in_reference = DrawPose(generator).translation};
@@ -260,7 +272,7 @@ template <>
 KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int size) {
   const int id = Draw(generator, 10, 99);
   KeyframeObservation keyframe{.id = {id},
-                               .features = DrawValue<FeatureFrame>(generator, size),
+                               .features = DrawKeyframeFeatures(generator, size),
                                .world_from_camera = DrawPose(generator),
                                .landmarks = {},
                                .reference = {Draw(generator, -1, id - 1)},
@@ -308,7 +320,7 @@ MapDelta DrawContent(std::mt19937& generator, int size) {
   MapDelta delta{.number = Draw(generator, 0, 99), .answers = {Draw(generator, -1, 99)}, .hash = generator()};
   if (size > 0) delta.lens = {DrawReal(generator, 1, 999), DrawReal(generator, 1, 999), -0.0123};
   for (int i = 0; i < 3 * size; ++i) {
-    auto features = std::make_shared<FeatureFrame>(DrawValue<FeatureFrame>(generator, i % 2));
+    auto features = std::make_shared<FeatureFrame>(DrawKeyframeFeatures(generator, i % 2));
     delta.new_keyframes.push_back(
         {{i}, {Draw(generator, -1, 9)}, DrawPose(generator), std::move(features), DrawReal(generator, 0.1, 9)});
   }
@@ -542,7 +554,7 @@ bool AreSame(const GlobalAdjustment& a, const GlobalAdjustment& b) {
 
 template <>
 RelocalizationRequest DrawValue<RelocalizationRequest>(std::mt19937& generator, int size) {
-  return {.features = DrawValue<FeatureFrame>(generator, size), .last_keyframe = {Draw(generator, -1, 99)}};
+  return {.features = DrawKeyframeFeatures(generator, size), .last_keyframe = {Draw(generator, -1, 99)}};
 }
 template <>
 bool AreSame(const RelocalizationRequest& a, const RelocalizationRequest& b) {

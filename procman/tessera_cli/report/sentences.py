@@ -32,6 +32,7 @@ def headline(result: Result) -> list[str]:
         _loops(result),
         _drift(result),
         _lens(result),
+        _readout(result),
         _failures(result),
     ]
     return [sentence for sentence in sentences if sentence]
@@ -109,6 +110,22 @@ def _lens(result: Result) -> str:
         f"Focal lengths {focal_words(error)} than the calibration's{edges} explain the images better, and were used: "
         "calibrate the camera anew."
     )
+
+
+def _readout(result: Result) -> str:
+    """What the tracker learned of when rows and depths are read."""
+    values = (result.summary.get("stage_values") or {}).get("tracker", {})
+    readout_ms, delay_ms = values.get("readout_ms") or 0.0, values.get("depth_delay_ms") or 0.0
+    found = []
+    if readout_ms:
+        found.append(f"the camera takes {readout_ms:.0f} ms to read an image (a rolling shutter)")
+    if delay_ms:
+        when = "after" if delay_ms > 0 else "before"
+        found.append(f"depths are measured {abs(delay_ms):.0f} ms {when} the time they are said to be of")
+    if not found:
+        return ""
+    sentence = " and ".join(found)
+    return f"{sentence[0].upper()}{sentence[1:]}; keypoints were corrected for it."
 
 
 def _failures(result: Result) -> str:

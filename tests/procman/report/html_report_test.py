@@ -163,6 +163,19 @@ def test_other_focal_lengths_than_the_calibration_s_are_told(tmp_path: Path) -> 
     )
 
 
+def test_a_rolling_shutter_and_late_depths_are_told(tmp_path: Path) -> None:
+    for readout_ms, delay_ms, words in [
+        (22.4, 0.0, "The camera takes 22 ms to read an image (a rolling shutter); keypoints"),
+        (0.0, -11.8, "Depths are measured 12 ms before the time they are said to be of; keypoints"),
+        (22.4, 7.0, "(a rolling shutter) and depths are measured 7 ms after the time"),
+        (0.0, 0.0, ""),
+    ]:
+        values = {"tracker": {"readout_ms": readout_ms, "depth_delay_ms": delay_ms}}
+        folder = write_run(tmp_path / f"{readout_ms} {delay_ms}", sensor="rgbd", stage_values=values)
+        told = [sentence for sentence in headline(read_run(folder)) if "corrected for it" in sentence]
+        assert len(told) == bool(words) and (not told or words in told[0])
+
+
 def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:
     folder = write_run(
         tmp_path / "drive", loops=False, frames_tracked=0, pose_time_ms=None, latency_ms=None, map_wait_ms=None
