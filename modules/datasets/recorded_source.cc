@@ -138,6 +138,7 @@ GrayImage RecordedSource::ReadRight(int64_t index) {
 
 DepthImage RecordedSource::ReadDepth(int64_t index) {
   const std::string& path = recording_.depth_paths.at(static_cast<size_t>(index));
+  if (path.empty()) return DepthImage(calibration().width_px, calibration().height_px);
   DepthImage image = ReadDepthImage(path);
   RequireOwnSize(image, "depth image " + path);
   return rectifier_->Depth(std::move(image));

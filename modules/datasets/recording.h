@@ -35,7 +35,7 @@ struct Recording {
   std::string times_path;                     // the file that lists them
   std::unique_ptr<ImageReader> left;          // at least as many images as utimes_us
   std::unique_ptr<ImageReader> right;         // stereo
-  std::vector<std::string> depth_paths;       // RGB-D: by frame
+  std::vector<std::string> depth_paths;       // RGB-D: by frame; empty: it has none
   std::vector<int64_t> depth_delays_us;       // RGB-D: by frame, CameraFrame::depth_delay_us
   CameraRig rig;                              // image size may be 0: unknown
   std::vector<GroundTruthPose> ground_truth;  // of the left camera before rectification; by frame

@@ -64,18 +64,17 @@ size_t Nearest(const std::vector<TimedFile>& files, int64_t utime_us) {
   return static_cast<size_t>((take_before ? before : after) - files.begin());
 }
 
-// Pairs of images that are each other's nearest and at most kMaxPairGapUs apart; so none is used twice.
-std::vector<std::pair<size_t, size_t>> Associate(const std::vector<TimedFile>& color,
-                                                 const std::vector<TimedFile>& depth) {
-  std::vector<std::pair<size_t, size_t>> pairs;
+// By color image, the depth image that belongs to it, or -1: the two are each other's nearest and at most kMaxPairGapUs
+// apart; so none is used twice.
+std::vector<int64_t> Associate(const std::vector<TimedFile>& color, const std::vector<TimedFile>& depth) {
+  std::vector<int64_t> depth_of_color;
   for (size_t i = 0; i < color.size(); ++i) {
     const size_t j = Nearest(depth, color[i].utime_us);
     const int64_t gap_us = std::abs(depth[j].utime_us - color[i].utime_us);
-    if (gap_us <= kMaxPairGapUs && Nearest(color, depth[j].utime_us) == i) {
-      pairs.emplace_back(i, j);
-    }
+    const bool is_pair = gap_us <= kMaxPairGapUs && Nearest(color, depth[j].utime_us) == i;
+    depth_of_color.push_back(is_pair ? static_cast<int64_t>(j) : -1);
   }
-  return pairs;
+  return depth_of_color;
 }
 
 void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording) {
@@ -90,19 +89,23 @@ void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording)
     return;
   }
   const std::vector<TimedFile> depth = ReadFileTable(folder, "depth.txt");
-  for (const auto& [i, j] : Associate(color, depth)) {
-    recording.utimes_us.push_back(color[i].utime_us);
-    paths.push_back(color[i].path);
-    recording.depth_paths.push_back(depth[j].path);
-    recording.depth_delays_us.push_back(depth[j].utime_us - color[i].utime_us);
-  }
-  if (paths.empty()) {
+  const std::vector<int64_t> depth_of_color = Associate(color, depth);
+  const auto num_alone = std::count(depth_of_color.begin(), depth_of_color.end(), -1);
+  if (num_alone == std::ssize(color)) {
     throw InputError("folder " + folder.string() +
                      ": no color image has a depth image within 20 ms: check rgb.txt and depth.txt");
   }
-  if (paths.size() < color.size()) {
-    recording.notes.push_back(std::to_string(color.size() - paths.size()) +
-                              " color images without a depth image within 20 ms are skipped.");
+  for (size_t i = 0; i < color.size(); ++i) {
+    const int64_t j = depth_of_color[i];
+    const TimedFile measured = j < 0 ? TimedFile{color[i].utime_us, ""} : depth[static_cast<size_t>(j)];
+    recording.utimes_us.push_back(color[i].utime_us);
+    paths.push_back(color[i].path);
+    recording.depth_paths.push_back(measured.path);
+    recording.depth_delays_us.push_back(measured.utime_us - color[i].utime_us);
+  }
+  if (num_alone > 0) {
+    recording.notes.push_back(std::to_string(num_alone) +
+                              " color images without a depth image within 20 ms are tracked without depth.");
   }
   recording.left = ReadImageFiles(std::move(paths));
 }

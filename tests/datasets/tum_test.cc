@@ -50,18 +50,21 @@ class TumTest : public testing::Test {
 
 TEST_F(TumTest, PairsImagesThatAreEachOthersNearest) {
   const auto source = OpenSource(Options());
-  ASSERT_EQ(source->num_frames(), 3);
-  const int64_t times_us[] = {1'000'000'000, 1'000'033'000, 1'000'100'000};
-  const int64_t depth_delays_us[] = {4'000, -3'000, -5'000};
-  for (int i = 0; i < 3; ++i) {
+  ASSERT_EQ(source->num_frames(), 4);
+  const int64_t times_us[] = {1'000'000'000, 1'000'033'000, 1'000'067'000, 1'000'100'000};
+  const int64_t depth_delays_us[] = {4'000, -3'000, 0, -5'000};
+  const uint16_t depths[] = {1000, 1001, 0, 1002};  // of the third image there is none
+  for (int i = 0; i < 4; ++i) {
     const auto frame = source->Next();
     EXPECT_EQ(frame->id.value, i);
     EXPECT_EQ(frame->utime_us, times_us[i]);
     EXPECT_EQ(frame->depth_delay_us, depth_delays_us[i]);
-    EXPECT_EQ(frame->left, ToGray(DatasetFolder::Pattern(640, 480, i < 2 ? i : 3)));
-    EXPECT_EQ(frame->depth.row(100)[100], 1000 + i);
+    EXPECT_EQ(frame->left, ToGray(DatasetFolder::Pattern(640, 480, i)));
+    ASSERT_EQ(frame->depth.width, 640);
+    EXPECT_EQ(frame->depth.row(100)[100], depths[i]);
   }
-  EXPECT_NE(Joined(source->notes()).find("1 color images without a depth image"), std::string::npos);
+  EXPECT_NE(Joined(source->notes()).find("1 color images without a depth image within 20 ms are tracked"),
+            std::string::npos);
   EXPECT_EQ(OpenSource(Options(SensorType::kMono))->num_frames(), 4);
 }
 

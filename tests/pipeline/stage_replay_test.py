@@ -72,6 +72,11 @@ def test_an_extractor_that_said_something_else_is_noticed(tessera: Tessera, reco
     assert f"score[5] was {message.score[5]} and is {message.score[5] - 1}." in finished.out
 
 
+def test_without_a_port_the_next_that_is_free_is_taken(tessera: Tessera, recorded: Path) -> None:
+    out = tessera.command("replay", recorded, "--only", "extractor_0").must_end_well().out
+    assert "extractor_0 says the same: " in out
+
+
 def test_one_bit_is_a_difference_and_times_of_measuring_are_none() -> None:
     before, after = (message_of("pose_t", frame=7, num_inliers=3) for _ in range(2))
     after.map_wait_us, after.header.utime = 5, 6

@@ -22,6 +22,7 @@ from tessera_cli.files import absolute
 from tessera_cli.interrupt import Interrupt
 from tessera_cli.lcm_bus import Bus, LoggedEvent, bus_url, listen, read_log
 from tessera_cli.messages import header_of, receive_logged, repair_request_t, stage_status_t
+from tessera_cli.runs.ports import take_free_port
 from tessera_cli.runs.run_settings import user_assignments
 from tessera_cli.settings import write_settings
 from tessera_cli.supervision.attributes import RunOptions
@@ -111,6 +112,8 @@ def replay_stage(arguments: Namespace) -> int:
     if not log.is_file():
         raise UserError(f"there is no log {log}.")
     recording = read_recording(log, stage, arguments.prefix)
+    if arguments.port is None:
+        arguments.port, _lock = take_free_port(arguments.prefix)  # held until the end
     process = Process(stage, command, "", int(instance), (), RunOptions(ready="started", auto_respawn="never"))
     with tempfile.TemporaryDirectory(prefix="tessera-replay-") as folder:
         settings_path = Path(folder) / "settings.yaml"
