@@ -46,6 +46,7 @@ struct OfflineRun {
   int num_lost = 0;
   int num_failures = 0;                                      // changes from tracked to lost
   int num_relocalized = 0;                                   // frames that a loop closer has placed
+  double readout_s = 0.0, depth_delay_s = 0.0;               // as learned by the end (MapTracker)
   std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
   // Poses of tracked frames: as known at the time, and after all optimization.
