@@ -17,7 +17,8 @@ namespace {
 
 // Of the points that agree on a pose by themselves: fewer that agree with the motion of a moment ago contradict it.
 constexpr double kMinShareWithMotion = 0.5;
-constexpr double kSameShare = 0.97;  // of points that agree with one pose and with another: neither is better
+// Of points that agree with one pose and with another, and of their residuals: neither is better.
+constexpr double kSameShare = 0.97, kSameRms = 1.15;
 constexpr double kDriftInterval_s = 0.1;
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr double kLongLost_s = 2.0;      // since the last pose: the camera may be where nothing is known of
@@ -58,6 +59,12 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
                                  : DepthInformation(view.features(), keypoint, Rigid3::Identity(), point);
   point.depth_sigma = DepthSigma(information, point_in_camera.norm());
   return point;
+}
+
+// Points beside one another err alike, which no covariance knows of: a thousand of them on one wall seem to fix how the
+// camera went along it by a hundredth of their noise. Whether as many agree with this pose, and nearly as well.
+bool FitsAsWell(const PoseOptimizationResult& pose, const PoseOptimizationResult& other) {
+  return pose.num_inliers >= kSameShare * other.num_inliers && pose.rms <= kSameRms * other.rms;
 }
 
 // The share of the image's cells that hold a keypoint whose point agrees with the pose.
@@ -449,19 +456,15 @@ MapTracker::FramePose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const 
   const Rigid3 reference_from_camera = (world_from_reference.Inverse() * seen.world_from_camera).Pose();
   StepEvidence evidence = Judge(*motion, last_->reference_from_camera.Inverse() * reference_from_camera,
                                 TranslationCovariance(by_images.information) / area);
-  const bool is_unexpected = evidence == StepEvidence::kContradictory;
-  // Points beside one another err alike, which no covariance knows of: a thousand of them on one wall seem to fix how
-  // the camera went along it by a hundredth of their noise. If as many agree with the motion, too, it takes part; in
-  // mono, whose map is made of such steps, that was no help.
-  if (is_unexpected && !do_points_contradict && frame.view->baseline_m() > 0.0) {
+  // Mono's map is made of such steps: there it was no help.
+  if (evidence == StepEvidence::kContradictory && !do_points_contradict && frame.view->baseline_m() > 0.0) {
     TrackedFrame alone = frame;
-    const int num_alone = OptimizeByConfirmed(replica_, options_.search.pose, nullptr, alone).num_inliers;
-    if (with_motion.num_inliers >= kSameShare * num_alone) evidence = StepEvidence::kWeak;
+    const PoseOptimizationResult by_all = OptimizeByConfirmed(replica_, options_.search.pose, nullptr, alone);
+    if (FitsAsWell(with_motion, by_all)) evidence = StepEvidence::kWeak;
   }
   const bool is_carried = evidence == StepEvidence::kWeak;
   frame = std::move(is_carried ? carried : seen);
-  return {is_carried ? with_motion : by_images, evidence,
-          is_unexpected ? std::optional(reference_from_camera) : std::nullopt};
+  return {is_carried ? with_motion : by_images, evidence};
 }
 
 // Where hardly a known point is left in view, the way on is what the last frame and this one show by themselves: both
@@ -525,7 +528,7 @@ void MapTracker::Remember(TrackedFrame frame, const FramePose& pose, bool is_wid
   const Sim3 reference_from_world = WorldFromReference().Inverse();
   const Rigid3 reference_from_camera = (reference_from_world * frame.world_from_camera).Pose();
   const double interval_s = SinceLast(*frame.view);
-  const bool is_doubtful = pose.unexpected && IsDoubtful(frame, *pose.unexpected);
+  const bool is_doubtful = pose.evidence == StepEvidence::kContradictory && IsDoubtful(frame, reference_from_camera);
   // After a step that contradicts it, nothing is known of how the camera moves: it may have been carried away.
   const Eigen::Matrix3d covariance =
       TranslationCovariance(pose.optimized.information) * reference_from_world.scale * reference_from_world.scale;

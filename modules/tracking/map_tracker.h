@@ -127,8 +127,6 @@ class MapTracker {
   struct FramePose {
     PoseOptimizationResult optimized;
     StepEvidence evidence = StepEvidence::kStrong;
-    // reference_from_camera by the images alone, if it contradicts the motion so far, whatever was made of it.
-    std::optional<Rigid3> unexpected = std::nullopt;
   };
 
   MapTrackingResult UndecidedResult(const FrameView& view) const;

@@ -274,6 +274,31 @@ TEST(MapTracker, AStepThatContradictsTheMotionIsDoubtfulIfItShowsInTheImage) {
   }
 }
 
+// One image shows the camera, which goes on steadily, behind or ahead of where it is: by what its points may err by all
+// together, or by what they can't.
+TEST(MapTracker, AStepThatPointsHardlyContradictGoesOnByTheMotion) {
+  for (const double step_length : {0.2, 1.2}) {
+    SyntheticWorld world(SensorType::kStereo, 0.3);
+    MapTracker tracker{MapTrackerOptions{}};
+    Mapper mapper{MapperOptions{}};
+    for (int64_t step = 0; step < 13; ++step) {
+      const double seen_at = static_cast<double>(step) - (step == 12 ? 0.5 : 0.0);
+      const MapTrackingResult result = tracker.Track(world.Take(step, world.Pose(step_length * seen_at)).features);
+      ASSERT_EQ(result.pose.state, TrackingState::kTracked);
+      for (const KeyframeObservation& keyframe : result.keyframes) {
+        ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+      }
+      if (step < 12) continue;
+      const auto distance_to = [&](double at) {
+        const Rigid3 pose = world.Pose(0.0).Inverse() * world.Pose(step_length * at);
+        return (result.pose.world_from_camera.translation - pose.translation).norm();
+      };
+      EXPECT_EQ(distance_to(12.0) < distance_to(11.5), step_length == 0.2) << step_length;
+      EXPECT_LT(std::min(distance_to(11.5), distance_to(12.0)), 0.025);
+    }
+  }
+}
+
 // The picture's keypoints show what no map knows, but for those that `keep` chooses.
 void Scramble(FeatureFrame& features, const std::function<bool(size_t keypoint)>& keep) {
   for (size_t i = 0; i < features.keypoints.size(); ++i) {
