@@ -6,8 +6,7 @@
 namespace tessera {
 namespace {
 
-constexpr double kRadius_px =
-    24.0;  // two or three keypoints' distances; by so much a fast turn moves an image in 15 ms
+constexpr double kRadius_px = 24.0;  // two keypoints' distances; a fast turn moves an image by as much in 15 ms
 constexpr size_t kMaxNeighbors = 48;
 constexpr size_t kMinNeighbors = 4;
 // Of the inverse depth. What differs by more belongs to another surface; what is off the plane by more than the second

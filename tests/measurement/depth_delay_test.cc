@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/vga_camera.h"
+
 namespace tessera {
 namespace {
 
@@ -12,15 +14,7 @@ constexpr double kDelay_s = 0.015;
 const CameraMotion kMotion{{0.3, -0.1, 0.2}, {0.4, 2.5, -0.3}};
 const Eigen::Vector3d kTable(0.1, 0.3, 0.5);  // a . point = 1: a table that the camera looks down at
 
-CameraCalibration Camera() {
-  return {.sensor = SensorType::kRgbd,
-          .width_px = 640,
-          .height_px = 480,
-          .fx_px = 500,
-          .fy_px = 500,
-          .cx_px = 320,
-          .cy_px = 240};
-}
+CameraCalibration Camera() { return VgaCamera(SensorType::kRgbd); }
 
 FeatureFrame FrameOf(const std::vector<Keypoint>& keypoints) {
   FeatureFrame frame;
@@ -71,7 +65,7 @@ TEST(DepthDelay, DepthsAreThoseOfTheImageAgain) {
     for (size_t i = 0; i < measured.size(); ++i) {
       const Keypoint& keypoint = corrected.keypoints[i];
       const Keypoint expected = KeypointAt({keypoint.x_px, keypoint.y_px}, kTable);
-      // The slope is held towards none by a keypoint's weight, which leaves a twentieth and less.
+      // Not exact: one keypoint's weight holds each slope towards none.
       EXPECT_NEAR(keypoint.depth_m, expected.depth_m, 0.002F * expected.depth_m);
       largest_before =
           std::max(largest_before, std::abs(1.0 - static_cast<double>(measured[i].depth_m / expected.depth_m)));

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "support/matchers.h"
+#include "support/vga_camera.h"
 
 namespace tessera {
 namespace {
@@ -12,13 +13,7 @@ const CameraMotion kMotion{{0.3, -0.1, 0.2}, {0.4, 2.5, -0.3}};
 
 FeatureFrame FrameOf(const std::vector<Eigen::Vector2d>& pixels, double depth) {
   FeatureFrame frame;
-  frame.calibration = {.sensor = SensorType::kRgbd,
-                       .width_px = 640,
-                       .height_px = 480,
-                       .fx_px = 500,
-                       .fy_px = 500,
-                       .cx_px = 320,
-                       .cy_px = 240};
+  frame.calibration = VgaCamera(SensorType::kRgbd);
   for (const Eigen::Vector2d& pixel : pixels) {
     frame.keypoints.push_back({.x_px = static_cast<float>(pixel.x()),
                                .y_px = static_cast<float>(pixel.y()),

@@ -222,9 +222,7 @@ def test_stages_that_are_killed_one_after_the_other_change_nothing(
     status, out = run.end()
     assert status == 0, out
     summary = json.loads((run.folder / "summary.json").read_text())
-    assert sum(" was restarted." in warning for warning in summary["warnings"]) == len(kills_in_order), out
-    # On a busy machine a stage may also say nothing for a while, which is told, too.
-    assert all(" was restarted." in word or " said nothing for " in word for word in summary["warnings"]), out
+    assert len(summary["warnings"]) == len(kills_in_order), out
     for key in ("ended", "frames", "frames_tracked", "frames_dropped", "trajectory_sha256", "map_sha256"):
         assert summary[key] == reference_run.summary[key], key
     assert not (run.folder / "journal").exists()

@@ -24,6 +24,9 @@ Image<Pixel> DrawImage(std::mt19937& generator, int width, int height) {
   return image;
 }
 
+// Another one for each time, either way.
+int64_t DepthDelayOf(int64_t utime_us) { return utime_us % 40'001 - 20'000; }
+
 Rigid3 DrawPose(std::mt19937& generator) {
   Eigen::Quaterniond rotation(DrawReal(generator, -1, 1), DrawReal(generator, -1, 1), DrawReal(generator, -1, 1),
                               DrawReal(generator, 0.1, 1));
@@ -62,7 +65,7 @@ CameraFrame DrawValue<CameraFrame>(std::mt19937& generator, int size) {
   const int height = size == 0 ? 1 : Draw(generator, 50, 130);
   CameraFrame frame{.id = {Draw(generator, 0, 9999)}, .utime_us = Draw(generator, 0, 1 << 30)};
   frame.sensor = static_cast<SensorType>(Draw(generator, 0, 2));
-  frame.depth_delay_us = Draw(generator, -20000, 20000);
+  frame.depth_delay_us = DepthDelayOf(frame.utime_us);
   frame.left = DrawImage<uint8_t>(generator, width, height);
   if (frame.sensor == SensorType::kStereo) frame.right = DrawImage<uint8_t>(generator, width, height);
   if (frame.sensor == SensorType::kRgbd) frame.depth = DrawImage<uint16_t>(generator, width, height);
@@ -132,7 +135,7 @@ TileJob DrawValue<TileJob>(std::mt19937& generator, int size) {
   job.previous_frame = {job.frame.value - 1};
   job.utime_us = Draw(generator, 0, 1 << 30);
   job.captured_us = Draw(generator, 0, 1 << 30);
-  job.depth_delay_us = Draw(generator, -20000, 20000);
+  job.depth_delay_us = DepthDelayOf(job.utime_us);
   job.num_tiles = Draw(generator, 1, 17);
   job.tile = job.num_tiles - 1;
   job.calibration = DrawCalibration(generator, width, height);
@@ -165,7 +168,7 @@ TileFeatures DrawValue<TileFeatures>(std::mt19937& generator, int size) {
   features.previous_frame = {Draw(generator, -1, 0)};
   features.utime_us = Draw(generator, 0, 1 << 30);
   features.captured_us = Draw(generator, 0, 1 << 30);
-  features.depth_delay_us = Draw(generator, -20000, 20000);
+  features.depth_delay_us = DepthDelayOf(features.utime_us);
   features.num_tiles = 3;
   features.tile = Draw(generator, 0, 2);
   features.calibration = DrawCalibration(generator, 640, 480);
@@ -225,7 +228,7 @@ FeatureFrame DrawValue<FeatureFrame>(std::mt19937& generator, int size) {
   frame.frame = {Draw(generator, 0, 9999)};
   frame.utime_us = Draw(generator, 0, 1 << 30);
   frame.captured_us = Draw(generator, 0, 1 << 30);
-  frame.depth_delay_us = Draw(generator, -20000, 20000);
+  frame.depth_delay_us = DepthDelayOf(frame.utime_us);
   frame.calibration = DrawCalibration(generator, 1241, 376);
   const int num_keypoints = size == 0 ? 0 : Draw(generator, 100, 3000);
   for (int i = 0; i < num_keypoints; ++i) {

@@ -6,21 +6,14 @@
 #include <random>
 
 #include "measurement/depth_delay.h"
+#include "support/vga_camera.h"
 
 namespace tessera {
 namespace {
 
 const Eigen::Vector3d kFloor(0.05, 0.45, 0.4);  // a . point = 1, in the world
 
-CameraCalibration Camera() {
-  return {.sensor = SensorType::kRgbd,
-          .width_px = 640,
-          .height_px = 480,
-          .fx_px = 500,
-          .fy_px = 500,
-          .cx_px = 320,
-          .cy_px = 240};
-}
+CameraCalibration Camera() { return VgaCamera(SensorType::kRgbd); }
 
 // Frames of a camera at the world's origin that turns by rates that change from frame to frame, in front of a slanted
 // surface whose points are known. Its depths are measured `delay_s` later and corrected by what the estimator holds

@@ -5,18 +5,12 @@
 #include <memory>
 #include <random>
 
+#include "support/vga_camera.h"
+
 namespace tessera {
 namespace {
 
-CameraCalibration Camera() {
-  return {.sensor = SensorType::kMono,
-          .width_px = 640,
-          .height_px = 480,
-          .fx_px = 500,
-          .fy_px = 500,
-          .cx_px = 320,
-          .cy_px = 240};
-}
+CameraCalibration Camera() { return VgaCamera(SensorType::kMono); }
 
 CameraMotion Turning() { return {Eigen::Vector3d::Zero(), {0.0, 1.0, 0.0}}; }
 
