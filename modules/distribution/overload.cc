@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdio>
 
+#include "core/time_units.h"
+
 namespace tessera {
 
 void Overload::NoteArrival(int64_t now_us) {
@@ -21,7 +23,7 @@ std::optional<std::string> Overload::Look(int64_t now_us) {
   const Period past = *period_;
   period_ = Period{now_us, num_arrived_, num_dropped_, sending_us_};
   if (num_dropped_ == past.num_dropped) return std::nullopt;
-  const double seconds = 1e-6 * static_cast<double>(std::max<int64_t>(1, sending_us_ - past.sending_us));
+  const double seconds = SecondsOf(std::max<int64_t>(1, sending_us_ - past.sending_us));
   const auto arrived = static_cast<double>(num_arrived_ - past.num_arrived);
   const auto dropped = static_cast<double>(num_dropped_ - past.num_dropped);
   std::array<char, 160> text{};

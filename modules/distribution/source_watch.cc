@@ -4,12 +4,14 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/time_units.h"
+
 namespace tessera {
 namespace {
 
 std::string SecondsText(int64_t time_us) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.1f s", 1e-6 * static_cast<double>(time_us));
+  std::snprintf(text.data(), text.size(), "%.1f s", SecondsOf(time_us));
   return text.data();
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/errors.h"
 #include "core/files.h"
+#include "core/time_units.h"
 #include "evaluation/map_ply.h"
 #include "evaluation/pose_text.h"
 #include "geometry/body_state.h"
@@ -87,7 +88,7 @@ Json ToJson(const std::vector<PartRecord>& parts) {
     };
     const auto seconds = [](const std::optional<StampedPose>& pose) -> Json {
       if (!pose) return nullptr;
-      return 1e-6 * static_cast<double>(pose->utime_us);
+      return SecondsOf(pose->utime_us);
     };
     list.push_back({{"first_frame", frame(part.first)},
                     {"last_frame", frame(part.last)},
@@ -138,7 +139,7 @@ std::string LoopsCsv(const RunRecord& record) {
   for (const ClosedLoop& loop : map.closed_loops()) {
     const auto seconds = [&](KeyframeId id) {
       const Keyframe* keyframe = map.FindKeyframe(id);
-      return keyframe == nullptr ? 0.0 : 1e-6 * static_cast<double>(keyframe->features->utime_us);
+      return keyframe == nullptr ? 0.0 : SecondsOf(keyframe->features->utime_us);
     };
     char row[128];
     std::snprintf(row, sizeof row, "%.6f,%.6f,%d,%.6f\n", seconds(loop.current), seconds(loop.matched), loop.num_points,

@@ -1,10 +1,12 @@
 #include "loop_closing/gap_motion.h"
 
+#include "core/time_units.h"
+
 namespace tessera {
 namespace {
 
 double SecondsBetween(const Keyframe& first, const Keyframe& second) {
-  return 1e-6 * static_cast<double>(second.features->utime_us - first.features->utime_us);
+  return SecondsOf(second.features->utime_us - first.features->utime_us);
 }
 
 // In the axes of `first`, per second.

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "core/time_units.h"
 #include "geometry/reprojection.h"
 #include "measurement/keypoint_measurement.h"
 #include "measurement/landmark_view.h"
@@ -116,7 +117,7 @@ std::vector<Step> StepsOf(const Map& map, std::span<const KeyframeId> part, cons
   for (size_t i = 0; i < part.size(); ++i) {
     const Keyframe& keyframe = *map.FindKeyframe(part[i]);
     const double depth = depths.at(part[i]);
-    steps[i].end_s = 1e-6 * static_cast<double>(keyframe.features->utime_us);
+    steps[i].end_s = SecondsOf(keyframe.features->utime_us);
     steps[i].log_depth = std::log(depth);
     steps[i].log_speed = std::log(kLeastShare * depth);
     if (i == 0) continue;

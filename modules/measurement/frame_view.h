@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "core/time_units.h"
 #include "features/feature_types.h"
 #include "geometry/reprojection.h"
 #include "measurement/feature_grid.h"
@@ -33,5 +34,9 @@ class FrameView {
   FeatureGrid grid_;
   double baseline_m_ = 0.0;
 };
+
+inline double SecondsBetween(const FrameView& first, const FrameView& second) {
+  return SecondsOf(second.features().utime_us - first.features().utime_us);
+}
 
 }  // namespace tessera

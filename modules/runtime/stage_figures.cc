@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/quantile.h"
+#include "core/time_units.h"
 #include "core/version.h"
 
 namespace tessera {
@@ -71,7 +72,7 @@ StageStatus StageFigures::MakeStatus(StageState state, const StreamCounts& count
   constexpr int64_t kStatisticsPeriodUs = 1'000'000;
   constexpr size_t kMaxSentenceLength = 300;  // so that a status is one message also on a LAN
   const double cpu_s = CpuSeconds();
-  const double elapsed_s = 1e-6 * static_cast<double>(now_us - status_us_);
+  const double elapsed_s = SecondsOf(now_us - status_us_);
   if (elapsed_s > 0.01) {
     status_.cpu_percent = 100.0 * (cpu_s - status_.cpu_s) / elapsed_s;
     status_us_ = now_us;

@@ -35,6 +35,8 @@ struct MonoStart {
   std::shared_ptr<const FrameView> second;
   Rigid3 second_from_first;  // in units of the points' median depth in the first camera
   std::vector<Point> points;
+
+  double interval_s() const { return SecondsBetween(*first, *second); }
 };
 
 class MonoInitializer {

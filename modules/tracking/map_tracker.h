@@ -6,7 +6,6 @@
 // the tracker triangulated itself are used: mono's first ones, and those with depth.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,20 +14,21 @@
 
 #include "core/result.h"
 #include "geometry/pose_optimization.h"
-#include "measurement/depth_delay.h"
 #include "measurement/depth_points.h"
 #include "messages/loop_types.h"
 #include "messages/tracking_types.h"
-#include "tracking/depth_delay_estimator.h"
+#include "tracking/capture_times.h"
 #include "tracking/frame_search.h"
 #include "tracking/ground_watch.h"
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
+#include "tracking/localized_frame.h"
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
-#include "tracking/pose_covariance.h"
-#include "tracking/readout_estimator.h"
+#include "tracking/part_start.h"
+#include "tracking/reference_keyframe.h"
 #include "tracking/scale_watch.h"
+#include "tracking/step_pose.h"
 #include "tracking/way_corrections.h"
 
 namespace tessera {
@@ -78,9 +78,8 @@ class MapTracker {
   // Mono: by how much the scale may have drifted since this part of the map began (ScaleWatch::drift). 0 where depth is
   // measured.
   double scale_drift() const { return scale_.drift(); }
-  // What was learned of the camera: see ReadoutEstimator, DepthDelayEstimator.
-  double readout_s() const { return readout_.readout_s(); }
-  double depth_delay_s() const { return depth_delay_.delay_s(); }
+  // What was learned of the camera.
+  const CaptureTimes& times() const { return times_; }
 
  private:
   using Frame = std::shared_ptr<const FrameView>;
@@ -91,113 +90,51 @@ class MapTracker {
   enum class State { kInitializing, kTracking, kLost };
   State state() const;
   bool has_map() const { return replica_.map().keyframes().size() > 0; }
+  Sim3 WorldFromReference() const { return reference_.WorldFromKeyframe(replica_); }
 
-  // A frame as the camera took it: row after row, and its depths at another time.
-  struct CameraView {
-    Frame view;
-    double depth_delay_s = 0.0;  // by how much later; 0: too little to matter
-    DepthSurfaces surfaces;      // if it matters
-  };
+  void UpdateLast();
+  bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
+  bool CanAskFor(const FrameView& view) const;
 
-  // What is remembered of the last tracked frame.
-  struct Last {
-    TrackedFrame frame;
-    Rigid3 reference_from_camera;  // in the reference's units (Keyframe::scale)
-    StepEvidence evidence = StepEvidence::kStrong;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    // of the camera's center, in its axes and those units
-    std::optional<CameraMotion> mean_motion = std::nullopt;  // since the frame before, in units of the world
-    bool is_wide_step = false;                               // FoundFrame::is_wide
-    std::optional<PoseInfluences> influences = std::nullopt;
-    std::optional<Matrix6d> pose_covariance = std::nullopt;  // of the way from the reference to here
-    int num_outliers = 0;                                    // points that were matched and contradict the pose
-    bool is_doubtful = false;                                // PoseEstimate::is_step_doubtful
-  };
+  std::optional<ExpectedStep> ExpectStep(const FrameView& view) const;
+  ExpectedFrame Expect(const FrameView& view) const;
+  bool Localize(const CapturedFrame& captured, FrameSearch& search);
+  StepPose OptimizeWithMotion(TrackedFrame& frame) const;
+  std::optional<CaptureTimes::Step> StepTo(const TrackedFrame& frame) const;
+  void Remember(TrackedFrame frame, const StepPose& pose, bool is_wide_step, int num_outliers);
+  bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
 
-  // When the camera was lost, if it moved steadily then: a guess at place and scale of the next part.
-  struct Drift {
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // units/s, in its own axes
-    int64_t utime_us = 0;
-  };
+  bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
+  bool NoteLoss(int64_t utime_us);
+  void ForgetMotion();
 
-  struct MotionAt {
-    MotionModel model;
-    int64_t utime_us = 0;
-  };
-
-  struct FramePose {
-    PoseOptimizationResult optimized;
-    StepEvidence evidence = StepEvidence::kStrong;
-  };
+  bool IsKeyframeDue();
+  KeyframeObservation MakeKeyframe(LocalizedFrame& localized);
+  void WatchScale();
+  void WatchGround(const TrackedFrame& frame, const CaptureTimes::Step& step, const StepPose& pose);
 
   MapTrackingResult UndecidedResult(const FrameView& view) const;
   void CountPoints(PoseEstimate& pose) const;
   void DescribePose(MapTrackingResult& result);
   BodyState DescribeBody() const;
-  bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
-  bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
-  bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
-  void UpdateLast();
-  bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
-  bool CanAskFor(const FrameView& view) const;
-  ExpectedFrame Expect(const FrameView& view) const;
-  FrameSearch SearchFor(const CameraView& taken) const;
-  bool Localize(const CameraView& taken, FrameSearch& search);
-  std::optional<CameraMotion> MeanMotionOf(const TrackedFrame& frame) const;
-  std::optional<CameraMotion> MotionOf(const TrackedFrame& frame) const;
-  CameraView Taken(const FeatureFrame& features) const;
-  Frame AtOneTime(const CameraView& taken, const TrackedFrame& frame, const std::optional<CameraMotion>& motion) const;
-  FeatureFrame Unrolled(const FeatureFrame& rolled, const TrackedFrame& frame, const CameraMotion& motion) const;
-  void LearnTimes(const TrackedFrame& frame);
-  Sim3 WorldFromReference() const;                // identity before there is a reference
-  double SinceLast(const FrameView& view) const;  // seconds
-  std::optional<MotionPrediction> PredictMotion(const FrameView& view) const;
-  PosePrior PriorOf(const MotionPrediction& motion) const;
-  bool IsDoubtful(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
-  bool IsWayOpen(const TrackedFrame& frame, const Rigid3& reference_from_camera) const;
-  MotionPrior ExpectFrom(KeyframeId reference, const Rigid3& reference_from_camera, int64_t utime_us) const;
-  void ResetMotion();
-  std::optional<Drift> DriftNow() const;
-  void TakeOverMotion(MonoStart& start);
-  std::optional<double> LengthByGround(const MonoStart& start, double interval_s);
-  void WatchScale(const Rigid3& reference_from_camera);
-  void WatchGround(const TrackedFrame& frame, const FramePose& pose);
-  bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
-  FramePose OptimizeWithMotion(TrackedFrame& frame) const;
-  std::optional<Matrix6d> CovarianceFromReference(const TrackedFrame& frame,
-                                                  const std::optional<PoseInfluences>& influences);
-  void Remember(TrackedFrame frame, const FramePose& pose, bool is_wide_step);
-  bool NoteLoss(int64_t utime_us);
-  bool IsKeyframeDue();
-  std::optional<PoseInfluences> InfluencesOnReference(const TrackedFrame& frame, KeyframeId reference) const;
-  KeyframeObservation MakeKeyframe(TrackedFrame& frame, KeyframeId reference, const Rigid3& reference_from_camera);
-  void AddDepthPoints(TrackedFrame& frame, KeyframeId id, SentKeyframe& sent) const;
-  void AddPairPoints(TrackedFrame& frame, KeyframeObservation& keyframe, SentKeyframe& sent) const;
 
   const MapTrackerOptions options_;
   MapReplica replica_;
   CameraCalibration calibration_;  // that the source's frames bring
-  MonoInitializer initializer_;
+  PartStart start_;
   KeyframeDecision decision_;
-  std::optional<Last> last_;                     // nullopt: no part of the map is followed
-  MotionModel motion_;                           // in the reference's units
-  std::optional<MotionAt> motion_at_reference_;  // as it was when that keyframe was made
-  ReadoutEstimator readout_;
-  DepthDelayEstimator depth_delay_;
-  std::optional<CameraMotion> camera_motion_;  // of the last frame, while it was read; in units of the world
-  std::optional<CameraMotion> camera_motion_at_reference_;  // likewise
+  std::optional<LocalizedFrame> last_;  // that was tracked; nullopt: no part of the map is followed
+  MotionModel motion_;                  // in the reference's units
+  CaptureTimes times_;
   KeyframeId next_keyframe_{0};
-  KeyframeId reference_;
-  double reference_scale_ = 1.0;  // of its units, when the last frame was tracked or the map changed
-  // By point: its own, or those of the first frame tracked from it.
-  std::optional<PoseInfluences> reference_influences_;
+  ReferenceKeyframe reference_;
   WayCorrections way_corrections_;
-  std::optional<TrackedFrame> reference_frame_;  // as it was when it became a keyframe; nullopt: it is the map's alone
-  Rigid3 world_from_start_;                      // camera where the next part of the map begins
-  std::optional<Drift> drift_;                   // of the last loss
-  ScaleWatch scale_;                             // mono
-  GroundWatch ground_;                           // mono; in units of the world
-  int64_t previous_utime_us_ = 0;                // of the frame before
-  std::optional<int64_t> tracked_utime_us_;      // of the last frame with a pose
+  ScaleWatch scale_;                         // mono
+  GroundWatch ground_;                       // mono; in units of the world
+  int64_t previous_utime_us_ = 0;            // of the frame before
+  std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
   Frame asked_;  // the frame that asked last
 };

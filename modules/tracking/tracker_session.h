@@ -61,8 +61,8 @@ class TrackerSession {
   size_t num_waiting() const { return waiting_.size(); }    // frames
   int64_t num_keyframes() const { return num_keyframes_; }  // sent
   double scale_drift() const { return tracker_.scale_drift(); }
-  double readout_s() const { return tracker_.readout_s(); }
-  double depth_delay_s() const { return tracker_.depth_delay_s(); }
+  double readout_s() const { return tracker_.times().readout_s(); }
+  double depth_delay_s() const { return tracker_.times().depth_delay_s(); }
   // The question that was sent and is not answered yet, to be sent again from time to time: a loop closer that was
   // started again did not hear it. nullptr: none.
   const RelocalizationRequest* open_question() const { return time_->has_open_question() ? &question_ : nullptr; }

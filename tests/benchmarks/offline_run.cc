@@ -190,8 +190,8 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
       return TrackOrAsk(tracker, features, run);
     });
     run.poses.push_back(result.pose);
-    run.readout_s = tracker.readout_s();
-    run.depth_delay_s = tracker.depth_delay_s();
+    run.readout_s = tracker.times().readout_s();
+    run.depth_delay_s = tracker.times().depth_delay_s();
     const bool is_lost = result.pose.state == TrackingState::kLost;
     run.num_lost += is_lost ? 1 : 0;
     run.num_failures += is_lost && !was_lost ? 1 : 0;

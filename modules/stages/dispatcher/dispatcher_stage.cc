@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "core/time_units.h"
 #include "features/tile_packing.h"
 #include "messages/tracking_types.h"
 
@@ -41,7 +42,7 @@ DispatcherStage::DispatcherStage(StageContext& context)
   context.SetValue("tile_columns", grid.columns);
   context.Every(std::chrono::milliseconds(200), [this] {
     session_.Watch(context_.now_us());
-    context_.SetValue("silent_s", 1e-6 * static_cast<double>(session_.SilenceUs(context_.now_us())));
+    context_.SetValue("silent_s", SecondsOf(session_.SilenceUs(context_.now_us())));
     context_.SetValue("gave_up", session_.has_given_up() ? 1.0 : 0.0);
     context_.SetValue("extractors", session_.queue().num_extractors());
     context_.SetValue("jobs_given_again", static_cast<double>(session_.queue().num_given_again()));

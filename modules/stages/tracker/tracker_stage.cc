@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/time_units.h"
 #include "wire/recorded_steps.h"
 
 namespace tessera {
@@ -128,7 +129,7 @@ void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {
   context_.SetValue("latency_ms", 1e-3 * static_cast<double>(pose.latency_us));
   context_.SetValue("state", static_cast<double>(pose.state));
   context_.SetValue("scale_sigma", pose.scale_sigma);
-  context_.SetValue("map_wait_s", 1e-6 * static_cast<double>(wait_.total_us()));
+  context_.SetValue("map_wait_s", SecondsOf(wait_.total_us()));
 }
 
 }  // namespace tessera

@@ -1,0 +1,31 @@
+// What goes to the mapper of a frame that becomes a keyframe, and what the tracker knows of it until the mapper
+// answers.
+#pragma once
+
+#include "measurement/depth_points.h"
+#include "messages/tracking_types.h"
+#include "tracking/map_replica.h"
+#include "tracking/reference_keyframe.h"
+
+namespace tessera {
+
+// `given`: the camera as the source brings it. The mapper may have found other focal lengths since; keypoints stay
+// where the lens of the frame's view moved them.
+KeyframeObservation ObserveKeyframe(KeyframeId id, const LocalizedFrame& localized, const CameraCalibration& given,
+                                    const ReferenceKeyframe& reference, const MapReplica& replica);
+
+// A point as one view alone knows it, in the frame of its camera. `covariance`: of the point, if its depth isn't known
+// by the view itself.
+Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d& point_in_camera,
+                 const Eigen::Matrix3d* covariance = nullptr);
+
+// Stereo, RGB-D: keypoints with depth that see no known point are points of their own, which the frame sees now.
+void AddDepthPoints(KeyframeId id, const DepthPointOptions& options, TrackedFrame& frame, SentKeyframe& sent);
+
+// Mono, after a wide step: what this keyframe and its reference see is known by them, and the frame sees it now. At the
+// next step it may be all that is left in view; with few known points, the mapper gets these as well. To be called
+// before the keyframe becomes the reference.
+void AddPairPoints(const ReferenceKeyframe& reference, const MapReplica& replica, TrackedFrame& frame,
+                   KeyframeObservation& keyframe, SentKeyframe& sent);
+
+}  // namespace tessera

@@ -1,0 +1,101 @@
+// Keyframes of frames at true poses in the synthetic world.
+#include "tracking/keyframe_making.h"
+
+#include <gtest/gtest.h>
+
+#include "support/matchers.h"
+#include "support/synthetic_world.h"
+#include "tracking/localized_frame.h"
+
+namespace tessera {
+namespace {
+
+class KeyframeMaking : public testing::TestWithParam<SensorType> {
+ protected:
+  LocalizedFrame At(int64_t step) {
+    LocalizedFrame localized{world_.TrackedAt(step), {}};
+    localized.reference_from_camera = localized.frame.world_from_camera;
+    return localized;
+  }
+  KeyframeObservation Observe(const LocalizedFrame& localized) const {
+    return ObserveKeyframe(KeyframeId{4}, localized, world_.calibration(), {.id = KeyframeId{3}}, replica_);
+  }
+
+  SyntheticWorld world_{GetParam(), 0.3};
+  MapReplica replica_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Sensors, KeyframeMaking, testing::Values(SensorType::kMono, SensorType::kStereo));
+
+TEST_P(KeyframeMaking, TheMapperGetsWhatTheFrameSeesByTheCameraOfTheSource) {
+  LocalizedFrame localized = At(1);
+  FeatureFrame features = localized.frame.view->features();
+  features.calibration.fx_px *= 1.01;  // as the mapper has found it
+  features.calibration.radial = 0.02;
+  localized.frame.view = ViewOf(features);
+  const KeyframeObservation keyframe = Observe(localized);
+  EXPECT_EQ(keyframe.id, KeyframeId{4});
+  EXPECT_EQ(keyframe.reference, KeyframeId{3});
+  EXPECT_EQ(keyframe.features.calibration.fx_px, world_.calibration().fx_px);
+  EXPECT_EQ(keyframe.features.calibration.radial, 0.02) << "keypoints stay where the lens moved them";
+  ASSERT_EQ(keyframe.landmarks.size(), localized.frame.points.size());
+  for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    EXPECT_EQ(keyframe.landmarks[i], localized.frame.points[i].id.landmark);
+  }
+  EXPECT_TRUE(keyframe.shared.empty());
+}
+
+// Points that the mapper has not named yet go by the keyframe that saw them first, and where that one has them.
+TEST_P(KeyframeMaking, PointsOfAnUnansweredKeyframeAreShared) {
+  const Rigid3 world_from_sent = SyntheticWorld::Pose(0.0);
+  replica_.Send(KeyframeId{2}, {{}, world_from_sent, {}});
+  LocalizedFrame localized = At(1);
+  const Eigen::Vector3d in_world = localized.frame.points[5].landmark.position_in_world;
+  localized.frame.points[5].id = {{}, KeyframeId{2}, 77};
+  const KeyframeObservation keyframe = Observe(localized);
+  ASSERT_EQ(keyframe.shared.size(), 1U);
+  EXPECT_EQ(keyframe.shared[0].keypoint, 5);
+  EXPECT_EQ(keyframe.shared[0].other, KeyframeId{2});
+  EXPECT_EQ(keyframe.shared[0].other_keypoint, 77);
+  EXPECT_LT((world_from_sent * keyframe.shared[0].position_in_other - in_world).norm(), 1e-9);
+}
+
+TEST_P(KeyframeMaking, KeypointsWithDepthArePointsUntilTheMapperAnswers) {
+  LocalizedFrame localized = At(1);
+  TrackedFrame& frame = localized.frame;
+  const size_t num_known = 50;
+  std::vector<SeenPoint> truth = frame.points;
+  for (size_t i = num_known; i < frame.points.size(); ++i) frame.points[i] = {};
+  SentKeyframe sent{KeyframeId{3}, localized.reference_from_camera, {}};
+  AddDepthPoints(KeyframeId{4}, {}, frame, sent);
+  EXPECT_EQ(sent.points.empty(), GetParam() == SensorType::kMono);
+  EXPECT_EQ(frame.NumPoints(), static_cast<int>(num_known + sent.points.size()));
+  for (const auto& [keypoint, in_camera] : sent.points) {
+    ASSERT_GE(keypoint, static_cast<int32_t>(num_known));
+    const SeenPoint& seen = frame.points[Index(keypoint)];
+    EXPECT_EQ(seen.id, (PointId{{}, KeyframeId{4}, keypoint}));
+    EXPECT_GT(in_camera.depth_sigma, 0.0);
+    EXPECT_LT((seen.landmark.position_in_world - frame.world_from_camera * in_camera.position_in_world).norm(), 1e-9);
+    const Eigen::Vector3d error = seen.landmark.position_in_world - truth[Index(keypoint)].landmark.position_in_world;
+    EXPECT_LT(error.norm(), 5.0 * in_camera.depth_sigma + 0.05);
+  }
+}
+
+TEST_P(KeyframeMaking, AWidePairOfMonoHasPointsOfItsOwn) {
+  LocalizedFrame other = At(0), localized = At(2);
+  const ReferenceKeyframe reference{.id = KeyframeId{3}, .frame = other.frame};
+  replica_.Send(reference.id, {{}, other.frame.world_from_camera, {}});
+  for (SeenPoint& point : localized.frame.points) point = {};
+  KeyframeObservation keyframe = Observe(localized);
+  SentKeyframe sent{reference.id, localized.reference_from_camera, {}};
+  ReferenceKeyframe blind = reference;
+  for (SeenPoint& point : blind.frame->points) point = {};
+  AddPairPoints(blind, replica_, localized.frame, keyframe, sent);
+  const bool is_mono = GetParam() == SensorType::kMono;
+  EXPECT_EQ(sent.points.size() > 100, is_mono);
+  EXPECT_EQ(keyframe.shared.size(), sent.points.size()) << "no known point is left in view: the mapper gets them too";
+  EXPECT_EQ(localized.frame.NumPoints(), static_cast<int>(sent.points.size()));
+}
+
+}  // namespace
+}  // namespace tessera
