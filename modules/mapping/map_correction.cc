@@ -1,5 +1,6 @@
 #include "mapping/map_correction.h"
 
+#include <cmath>
 #include <set>
 #include <vector>
 
@@ -87,6 +88,23 @@ void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEdit
   FuseVisits(loop, options, editor);
   editor.AddClosedLoop(
       {loop.answers, loop.matched, loop.matched_from_current.scale, static_cast<int32_t>(loop.seen.size())});
+}
+
+Corrections ScaleCorrections(const Map& map, KeyframeId keyframe, const std::vector<ScaleMending>& mendings) {
+  Corrections corrections;
+  Rigid3 last_pose, new_pose;  // of the keyframe before
+  double factor = 1.0;         // there
+  auto next = mendings.begin();
+  for (const KeyframeId id : MapPartOf(map, RootOf(map, keyframe))) {
+    const Rigid3& pose = map.FindKeyframe(id)->world_from_camera;
+    Rigid3 last_from_this = last_pose.Inverse() * pose;
+    last_from_this.translation *= factor;
+    new_pose = new_pose * last_from_this;
+    last_pose = pose;
+    for (; next != mendings.end() && next->keyframe <= id; ++next) factor = std::exp(next->log_factor);
+    if (next != mendings.begin()) corrections.emplace(id, Sim3::From(new_pose, factor) * Sim3::From(pose).Inverse());
+  }
+  return corrections;
 }
 
 AdjustmentBase TakeBase(const Map& map) {

@@ -7,6 +7,7 @@
 #include "map/map_editor.h"
 #include "mapping/landmark_fusion.h"
 #include "messages/loop_types.h"
+#include "messages/tracking_types.h"
 
 namespace tessera {
 
@@ -31,6 +32,13 @@ void ApplyCorrections(const Corrections& corrections, MapEditor& editor);
 // neighbors observe the older landmarks, and two parts of the map that the loop joins get one spanning tree. Both
 // keyframes must be in the map.
 void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEditor& editor);
+
+// What mends the scale of the part of the map that `keyframe` belongs to: `mendings` by keyframe. What came before the
+// first of them stays. In the order of ids, which is that of the camera's way,
+//
+//   new_world_from_k = new_world_from_(k-1) [(k-1)_from_k, its translation times the factor at k-1],  scaled by that at
+//   k
+Corrections ScaleCorrections(const Map& map, KeyframeId keyframe, const std::vector<ScaleMending>& mendings);
 
 // The map's poses and positions at the moment when a global adjustment was requested.
 struct AdjustmentBase {

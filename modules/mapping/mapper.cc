@@ -70,8 +70,8 @@ Mapper::Mapper(const MapperOptions& options) : options_(options), keyframe_culle
 MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& due) {
   MapEditor editor(map_);
   ApplyDue(due, seen.id, editor);
-  const bool has_new_lens = RefineLens(seen, editor);
-  is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_lens;
+  const bool has_new_lens = RefineLens(seen, editor), is_mended = MendScale(seen, editor);
+  is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_lens && !is_mended;
   Insert(seen, editor);
   RememberMotion(seen);
   ObserveLandmarks(seen, editor);
@@ -173,14 +173,31 @@ bool Mapper::ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId n
   return applies;
 }
 
-// Poses move: what loops and an adjustment under way are measured against is gone.
 bool Mapper::RefineLens(const KeyframeObservation& seen, MapEditor& editor) {
   const CameraCalibration& given = seen.features.calibration;
   if (!options_.refines_focal || !lens_refiner_.Refine(seen.id, given, editor)) return false;
-  last_corrected_ = seen.id;
+  NoteCorrected(seen.id);
+  return true;
+}
+
+// Where a loop was closed since the scale slipped, it has set the scale.
+bool Mapper::MendScale(const KeyframeObservation& seen, MapEditor& editor) {
+  const KeyframeId reference = removed_.Successor(map_, seen.reference);
+  if (seen.mendings.empty() || !reference.valid()) return false;
+  for (const ClosedLoop& loop : map_.closed_loops()) {
+    if (loop.current >= seen.mendings.front().keyframe) return false;
+  }
+  ApplyCorrections(ScaleCorrections(map_, reference, seen.mendings), editor);
+  ++num_scale_mendings_;
+  NoteCorrected(seen.id);
+  return true;
+}
+
+// Poses moved: what loops and an adjustment under way are measured against is gone.
+void Mapper::NoteCorrected(KeyframeId now) {
+  last_corrected_ = now;
   is_base_outdated_ = base_.has_value();
   wants_adjustment_ |= is_base_outdated_;
-  return true;
 }
 
 bool Mapper::AskForAdjustment(KeyframeId now) {

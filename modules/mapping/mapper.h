@@ -72,6 +72,8 @@ class Mapper {
   const Map& map() const { return map_; }
   // Loops that were ignored since the map was corrected after they were found: the next keyframes find them again.
   int64_t num_void_loops() const { return num_void_loops_; }
+  // How often the scale was mended, as the ground shows it (KeyframeObservation::mendings).
+  int64_t num_scale_mendings() const { return num_scale_mendings_; }
   const LensRefiner& lens_refiner() const { return lens_refiner_; }
   // The poses of culled keyframes.
   const RemovedKeyframes& removed_keyframes() const { return removed_; }
@@ -81,6 +83,8 @@ class Mapper {
   bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
   bool RefineLens(const KeyframeObservation& seen, MapEditor& editor);
+  bool MendScale(const KeyframeObservation& seen, MapEditor& editor);
+  void NoteCorrected(KeyframeId now);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);
   void RememberMotion(const KeyframeObservation& seen);
@@ -108,6 +112,7 @@ class Mapper {
   bool is_base_outdated_ = false;       // a loop was closed since: the adjustment is ignored
   bool is_polish_asked_ = false;
   int64_t num_void_loops_ = 0;
+  int64_t num_scale_mendings_ = 0;
 };
 
 }  // namespace tessera

@@ -70,6 +70,7 @@ class MapperSession {
   size_t num_waiting() const { return waiting_.size(); }  // keyframes
   const Map& map() const { return mapper_.map(); }
   const LensRefiner& lens_refiner() const { return mapper_.lens_refiner(); }
+  int64_t num_scale_mendings() const { return mapper_.num_scale_mendings(); }
 
  private:
   // The last keyframe that gets a loop result; invalid: there are none.

@@ -68,6 +68,14 @@ struct MotionPrior {
   bool is_known() const { return !information.isZero(0.0); }
 };
 
+// Mono: from this keyframe on, up to the next one that is named, lengths in the map are to be multiplied by
+// exp(log_factor).
+struct ScaleMending {
+  KeyframeId keyframe;
+  double log_factor = 0.0;
+  bool operator==(const ScaleMending&) const = default;
+};
+
 // A frame that becomes part of the map. Its features never change; its pose does, later, in the mapper.
 struct KeyframeObservation {
   KeyframeId id;
@@ -78,6 +86,7 @@ struct KeyframeObservation {
   Rigid3 reference_from_camera;        // as in PoseEstimate
   MotionPrior expected;                // by how the camera moved when `reference` was made; where images leave it open
   std::vector<SharedKeypoint> shared;  // points without an id yet: mono's first ones, or from depth
+  std::vector<ScaleMending> mendings;  // by keyframe, earlier ones of its part; empty: its scale has not slipped
   int64_t num_deltas = 0;              // as in PoseEstimate
 };
 

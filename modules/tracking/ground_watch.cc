@@ -22,7 +22,9 @@ constexpr size_t kMinHeights = 60;       // to know it
 constexpr double kNear = 0.25;           // in the logarithm: about the same height
 constexpr double kMinShareNear = 0.75;
 constexpr size_t kNumLatest = 20;
-constexpr double kMaxBend = 0.5;  // of the logarithm of the height
+constexpr double kSettled = 0.15;  // in the logarithm: heights that stay about as they are
+constexpr size_t kNumSteps = 600;  // remembered
+constexpr double kMaxBend = 0.5;   // of the logarithm of the height
 constexpr int kNumFirstSteps = 200, kStepsBetween = 4;
 constexpr double kPairEvidence = 8.0;  // what one step may say if it is all there is
 constexpr double kMaxLengthSigma = 0.3;
@@ -40,18 +42,30 @@ void GroundWatch::Add(const FrameView& last, const FrameView& current, const Ste
   const bool is_asked = down && (log_height_ || num_steps_ < kNumFirstSteps || num_steps_ % kStepsBetween == 0);
   const Rigid3 way{rotation, rotation * Direction(step, seen)};
   speed_.Add(is_asked ? SpeedOverGround(last, current, way, *down, step.interval_s) : std::nullopt, step.interval_s);
-  if (is_asked && speed_.sigma() < kMaxSpeedSigma) LearnHeight(std::log(length / step.interval_s) - speed_.log_speed());
+  steps_.push_back({step.reference, std::log(length / step.interval_s)});
+  if (steps_.size() > kNumSteps) steps_.erase(steps_.begin());
+  if (is_asked && speed_.sigma() < kMaxSpeedSigma) {
+    steps_.back().log_ground_speed = speed_.log_speed();
+    LearnHeight(steps_.back().log_map_speed - speed_.log_speed());
+  }
 }
 
 void GroundWatch::Rescale(double factor) {
   const double change = std::log(factor);
+  for (GroundStep& step : steps_) step.log_map_speed += change;
   for (double& log_height : log_heights_) log_height += change;
   if (log_height_) *log_height_ += change;
 }
 
 void GroundWatch::ForgetHeight() {
-  log_heights_.clear();
+  ForgetSteps();
   log_height_.reset();
+}
+
+void GroundWatch::ForgetSteps() {
+  steps_.clear();
+  log_heights_.clear();
+  num_elsewhere_ = 0;
 }
 
 std::optional<double> GroundWatch::LengthAfterGap(const FrameView& last, const FrameView& current,
@@ -68,6 +82,33 @@ double GroundWatch::ScaleFall() const {
   if (!log_height_ || log_heights_.size() < kNumLatest || !speed_.is_plausible()) return 0.0;
   const double fall = *log_height_ - OrderStatistic({log_heights_.end() - kNumLatest, log_heights_.end()}, 0.5);
   return fall > kMaxBend ? fall : 0.0;
+}
+
+bool GroundWatch::HasFallenAndStays() const {
+  if (ScaleFall() == 0.0) return false;
+  const auto half = log_heights_.end() - kNumLatest / 2;
+  const double change =
+      OrderStatistic({half, log_heights_.end()}, 0.5) - OrderStatistic({log_heights_.end() - kNumLatest, half}, 0.5);
+  return std::abs(change) < kSettled;
+}
+
+bool GroundWatch::IsElsewhereForLong() const {
+  if (!log_height_ || num_elsewhere_ < static_cast<int>(kMinHeights)) return false;
+  const std::vector<double> last(log_heights_.end() - kMinHeights, log_heights_.end());
+  const double median = OrderStatistic(last, 0.5);
+  const auto num_near = std::ranges::count_if(last, [&](double height) { return std::abs(height - median) < kNear; });
+  return std::abs(median - *log_height_) > kMaxBend && static_cast<double>(num_near) >= kMinShareNear * kMinHeights;
+}
+
+std::vector<ScaleMending> GroundWatch::Mendings() const {
+  if (!HasFallenAndStays() && !IsElsewhereForLong()) return {};
+  return MendingsOf(steps_, *log_height_);
+}
+
+void GroundWatch::NoteMended() {
+  steps_.resize(NumSound(steps_, *log_height_));
+  log_heights_.clear();
+  num_elsewhere_ = 0;
 }
 
 std::optional<double> GroundWatch::height() const {

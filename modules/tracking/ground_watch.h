@@ -11,10 +11,12 @@
 #include <Eigen/Core>
 #include <deque>
 #include <optional>
+#include <vector>
 
 #include "geometry/rigid3.h"
 #include "measurement/frame_view.h"
 #include "tracking/ground_speed_filter.h"
+#include "tracking/scale_mending.h"
 
 namespace tessera {
 
@@ -25,6 +27,7 @@ class GroundWatch {
     double interval_s = 0.0;           // > 0
     double direction_sigma_rad = 0.0;  // of the way, across it, as the images have it
     bool is_seen = true;               // by the images alone, not by how the camera moved before
+    KeyframeId reference;              // from which both frames were tracked
   };
   // The camera moved so from one frame to the next.
   void Add(const FrameView& last, const FrameView& current, const Step& step);
@@ -32,6 +35,8 @@ class GroundWatch {
   void Rescale(double factor);
   // Another part of the map begins, of which nothing tells the scale.
   void ForgetHeight();
+  // The way goes on from an earlier place of this part.
+  void ForgetSteps();
 
   // The length in units of the map of a step between two frames at the end of `gap_s` >= 0 in which the ground was not
   // seen; only the direction of `last_from_current` matters. nullopt: the ground doesn't tell it.
@@ -43,12 +48,20 @@ class GroundWatch {
   // known.
   double ScaleFall() const;
 
+  // What mends the map where its scale has slipped, once it stays as it is: it has fallen so clearly (ScaleFall), or
+  // was another one for long. Empty: there is nothing to mend, or not yet.
+  std::vector<ScaleMending> Mendings() const;
+  // The map has been mended so.
+  void NoteMended();
+
   // The height of the camera in units of the map; nullopt: not known, or not constant.
   std::optional<double> height() const;
 
  private:
   void LearnDirection(const Eigen::Vector3d& direction);
   void LearnHeight(double log_height);
+  bool HasFallenAndStays() const;
+  bool IsElsewhereForLong() const;
   Eigen::Vector3d Direction(const Step& step, const Eigen::Vector3d& seen) const;
   std::optional<Eigen::Vector3d> Down() const;
 
@@ -59,6 +72,7 @@ class GroundWatch {
   double direction_variance_ = 0.0;                              // across, an axis
   Eigen::Matrix3d direction_moments_ = Eigen::Matrix3d::Zero();  // mean of direction * direction'
   GroundSpeedFilter speed_;
+  std::vector<GroundStep> steps_;   // the last ones, of one way through this part of the map
   std::deque<double> log_heights_;  // the last ones
   std::optional<double> log_height_;
   int num_in_height_ = 0;  // heights that it is the mean of

@@ -113,7 +113,12 @@ void MapTracker::UpdateLast() {
   decision_.Renew(replica_);
   reference_.RenewPoints(replica_);
   if (const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_.id)) {
-    ground_.Rescale(world_from_reference->scale / reference_.scale);
+    if (mends_scale_.valid() && !replica_.sent().contains(mends_scale_)) {
+      ground_.NoteMended();
+      mends_scale_ = {};
+    } else {
+      ground_.Rescale(world_from_reference->scale / reference_.scale);
+    }
     reference_.scale = world_from_reference->scale;
     last_->frame.world_from_camera = (*world_from_reference * last_->reference_from_camera).Pose();
   }
@@ -150,6 +155,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   if (!reference_.id.valid() || replica_.PartOf(reference_.id) != replica_.PartOf(answer.reference)) {
     ground_.ForgetHeight();
   }
+  ground_.ForgetSteps();
   reference_ = ReferenceKeyframe{.id = answer.reference, .scale = world_from_reference->scale};
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
@@ -307,6 +313,7 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
   if (!start) return false;
   reference_ = {};
   scale_.Restart();
+  ground_.ForgetSteps();
   const Rigid3& world_from_first = start_.world_from_start();
   LocalizedFrame first{TrackedFrame(start->first), world_from_first};
   first.frame.world_from_camera = world_from_first;
@@ -370,6 +377,10 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
   const KeyframeId id = next_keyframe_;
   const bool begins_part = !reference_.id.valid();
   KeyframeObservation keyframe = ObserveKeyframe(id, localized, calibration_, reference_, replica_);
+  if (!begins_part && !mends_scale_.valid()) {
+    keyframe.mendings = ground_.Mendings();
+    if (!keyframe.mendings.empty()) mends_scale_ = id;
+  }
   SentKeyframe sent{reference_.id, localized.reference_from_camera, {}};
   // Points that one view alone knows are no measure of what should be seen again, unless there are no others.
   const bool has_known_points = frame.NumPoints() > 0;
@@ -409,7 +420,7 @@ void MapTracker::WatchGround(const TrackedFrame& frame, const CaptureTimes::Step
   const double variance_across = 0.5 * (covariance.trace() - direction.dot(covariance * direction));
   ground_.Add(*last_->frame.view, *frame.view,
               {last_from_current, step.interval_s, std::sqrt(std::max(variance_across, 0.0)) / length,
-               pose.evidence != StepEvidence::kWeak});
+               pose.evidence != StepEvidence::kWeak, reference_.id});
 }
 
 MapTrackingResult MapTracker::UndecidedResult(const FrameView& view) const {

@@ -133,6 +133,7 @@ class MapTracker {
   WayCorrections way_corrections_;
   ScaleWatch scale_;                         // mono
   GroundWatch ground_;                       // mono; in units of the world
+  KeyframeId mends_scale_;                   // the keyframe that brings what mends it; invalid: none is on its way
   int64_t previous_utime_us_ = 0;            // of the frame before
   std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;

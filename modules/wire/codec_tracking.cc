@@ -1,5 +1,6 @@
 // FEATURES, POSE, KEYFRAME.
 #include <algorithm>
+#include <functional>
 
 #include "messages/tracking_types.h"
 #include "tessera/features_t.hpp"
@@ -45,6 +46,16 @@ struct Layout<motion_prior_t> {
 };
 
 template <>
+struct Layout<scale_mending_t> {
+  template <class Fields, class Message, class Value>
+  static void Describe(Fields& fields, Message& message, Value& mending) {
+    fields(message.keyframe, mending.keyframe);
+    fields(message.log_factor, mending.log_factor);
+    fields.Check(mending.keyframe.valid(), "the scale is to be mended from a keyframe with a negative number");
+  }
+};
+
+template <>
 struct Layout<keyframe_t> {
   template <class Fields, class Message, class Value>
   static void Describe(Fields& fields, Message& message, Value& keyframe) {
@@ -64,6 +75,10 @@ struct Layout<keyframe_t> {
       return static_cast<size_t>(shared.keypoint) < num_keypoints && shared.other < keyframe.id;
     });
     fields.Check(do_fit && keyframe.shared.size() <= num_keypoints, "a shared keypoint is out of range");
+    fields.List(message.num_mendings, message.mendings, keyframe.mendings);
+    const auto are_in_order = std::ranges::is_sorted(keyframe.mendings, std::less_equal{}, &ScaleMending::keyframe);
+    fields.Check(are_in_order && (keyframe.mendings.empty() || keyframe.mendings.back().keyframe < keyframe.id),
+                 "the keyframes from which the scale is to be mended are not in order");
   }
 };
 TESSERA_CODEC(KeyframeObservation, keyframe_t);

@@ -56,6 +56,42 @@ TEST(MapCorrection, KeyframesMoveByTheirCorrectionOrTheirParents) {
   });
 }
 
+// From keyframe 3 on, the map is too small by a factor of 4, but for what came after keyframe 4: by 2.
+TEST(MapCorrection, MendsAScaleThatHasSlipped) {
+  SyntheticWorld world(SensorType::kMono, 0.0);
+  PlantedMap planted(world);
+  for (int64_t k = 0; k < 7; ++k) planted.Add(k, {k - 1});
+  const KeyframeId elsewhere = planted.Add(20, {});
+  const Map before = planted.map();
+  const std::vector<double> factors{1.0, 1.0, 1.0, 4.0, 4.0, 2.0, 2.0};
+  EditBoth(planted.map(), [&](MapEditor& editor) {
+    const std::vector<ScaleMending> mendings{{{3}, std::log(4.0)}, {{5}, std::log(2.0)}};
+    ApplyCorrections(ScaleCorrections(editor.map(), {6}, mendings), editor);
+  });
+  for (int64_t k = 0; k < 7; ++k) {
+    const Keyframe& keyframe = *planted.map().FindKeyframe({k});
+    EXPECT_NEAR(keyframe.scale, factors[static_cast<size_t>(k)] * before.FindKeyframe({k})->scale, 1e-12);
+    if (k == 0) continue;
+    const Rigid3 way = planted.map().FindKeyframe({k - 1})->world_from_camera.Inverse() * keyframe.world_from_camera;
+    Rigid3 expected = planted.Between({k - 1}, {k});
+    expected.translation *= factors[static_cast<size_t>(k - 1)];
+    EXPECT_THAT(way, IsNear(expected, 1e-9)) << k;
+  }
+  ExpectNear(planted.map().FindKeyframe(elsewhere)->WorldFromKeyframe(),
+             before.FindKeyframe(elsewhere)->WorldFromKeyframe());
+}
+
+TEST(MapCorrection, AWholePartIsMendedAroundItsFirstKeyframe) {
+  SyntheticWorld world(SensorType::kMono, 0.0);
+  PlantedMap planted(world);
+  for (int64_t k = 0; k < 4; ++k) planted.Add(k, {k - 1});
+  const Corrections corrections = ScaleCorrections(planted.map(), {3}, {{{0}, std::log(3.0)}});
+  ASSERT_EQ(corrections.size(), 4U);
+  const Sim3 first = planted.map().FindKeyframe({0})->WorldFromKeyframe();
+  const Sim3 grown = first * Sim3::From({}, 3.0) * first.Inverse();
+  for (const auto& [id, new_world_from_old] : corrections) ExpectNear(new_world_from_old, grown);
+}
+
 // Two visits of one place, as two parts of the map; the second stands elsewhere, in another unit.
 class TwoVisits {
  public:

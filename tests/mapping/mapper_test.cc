@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -195,6 +196,30 @@ TEST(Mapper, LandmarksThatAreGoneAreSkipped) {
   const Keyframe& keyframe = *mapper.map().FindKeyframe({1});
   EXPECT_NE(keyframe.landmarks[0], LandmarkId{1000000});
   EXPECT_LE(std::count(keyframe.landmarks.begin(), keyframe.landmarks.end(), LandmarkId{0}), 1);
+}
+
+// The keyframe comes into a map whose last keyframes are twice as far apart as they were.
+TEST(Mapper, MendsTheScaleBeforeTheKeyframeComesInUnlessALoopHasSetIt) {
+  for (const bool has_loop : {false, true}) {
+    SyntheticWorld world(SensorType::kMono, 0.0);
+    Drive drive(world, 0.0, 1);
+    Mapper mapper({});
+    for (int64_t step = 0; step < 8; ++step) (void)mapper.Process(drive.Next(step));
+    if (has_loop) {
+      LoopResult loop{.answers = {7}, .matched = {0}, .corrections = {}, .seen = {}};
+      (void)mapper.Process(drive.Next(8), {.loops = {loop}, .adjustment = {}});
+    }
+    const auto length = [&](int64_t from, int64_t to) {
+      return CenterError(mapper.map().FindKeyframe({from})->world_from_camera,
+                         mapper.map().FindKeyframe({to})->world_from_camera);
+    };
+    const double before = length(4, 7), sound = length(0, 3);
+    KeyframeObservation seen = drive.Next(has_loop ? 9 : 8);
+    seen.mendings = {{{4}, std::log(2.0)}};
+    EXPECT_EQ(mapper.LastStep(mapper.Process(seen)).is_repeatable, has_loop);
+    EXPECT_NEAR(length(4, 7) / before, has_loop ? 1.0 : 2.0, 0.1);
+    EXPECT_NEAR(length(0, 3) / sound, 1.0, 0.1);
+  }
 }
 
 TEST(Mapper, RefusesAKeyframeThatItHasOrThatDoesNotFit) {

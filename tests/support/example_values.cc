@@ -290,6 +290,7 @@ KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int 
                                {Draw(generator, 0, id - 1)},
                                Draw(generator, 0, 999),
                                DrawPose(generator).translation});
+    keyframe.mendings = {{{id - 7}, 0.5}, {{id - 2}, -0.7}};
   }
   return keyframe;
 }
@@ -304,7 +305,8 @@ bool AreSame(const KeyframeObservation& a, const KeyframeObservation& b) {
          AreSamePose(a.reference_from_camera, b.reference_from_camera) && a.num_deltas == b.num_deltas &&
          a.expected.position_in_reference == b.expected.position_in_reference &&
          a.expected.information == b.expected.information &&
-         std::equal(a.shared.begin(), a.shared.end(), b.shared.begin(), b.shared.end(), is_same);
+         std::equal(a.shared.begin(), a.shared.end(), b.shared.begin(), b.shared.end(), is_same) &&
+         a.mendings == b.mendings;
 }
 
 namespace {

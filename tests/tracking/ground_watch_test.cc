@@ -19,6 +19,7 @@ class Drive {
  public:
   void Go(int num_steps, double units, const std::function<double(int)>& height_m = nullptr) {
     for (int i = 0; i < num_steps; ++i) {
+      reference_.value += i % 5 == 0 ? 1 : 0;
       way_m_ += kStep_m;
       if (way_m_ > 220.0) way_m_ -= 200.0, last_ = nullptr;
       const Rigid3 pose = SyntheticRoad::Pose(way_m_, kPitch_rad, height_m ? height_m(i) : SyntheticRoad::kHeight_m);
@@ -26,7 +27,7 @@ class Drive {
       if (last_ != nullptr) {
         Rigid3 last_from_current = last_pose_.Inverse() * pose;
         last_from_current.translation *= units;
-        watch_.Add(*last_, *view, {last_from_current, kInterval_s, 0.005});
+        watch_.Add(*last_, *view, {last_from_current, kInterval_s, 0.005, true, reference_});
       }
       last_ = view;
       last_pose_ = pose;
@@ -38,6 +39,7 @@ class Drive {
  private:
   SyntheticRoad road_{3000};
   GroundWatch watch_;
+  KeyframeId reference_{0};
   double way_m_ = 20.0;
   std::shared_ptr<const FrameView> last_;
   Rigid3 last_pose_;
@@ -64,6 +66,49 @@ TEST(GroundWatch, SaysThatTheScaleHasFallenUntilItHasLastedForLong) {
   EXPECT_EQ(drive.watch().ScaleFall(), 0.0) << "another height is known";
   ASSERT_TRUE(drive.watch().height());
   EXPECT_NEAR(*drive.watch().height() / (0.01 * SyntheticRoad::kHeight_m), 1.0, 0.05);
+}
+
+// From keyframe 20 on, a hundred steps at right scale behind it.
+TEST(GroundWatch, MendsAScaleThatHasFallenOnceItStays) {
+  Drive drive;
+  drive.Go(100, 0.04);
+  EXPECT_TRUE(drive.watch().Mendings().empty());
+  drive.Go(6, 0.01);
+  EXPECT_TRUE(drive.watch().Mendings().empty()) << "too soon";
+  drive.Go(34, 0.01);
+  const std::vector<ScaleMending> mendings = drive.watch().Mendings();
+  ASSERT_FALSE(mendings.empty());
+  EXPECT_NEAR(static_cast<double>(mendings.front().keyframe.value), 20.0, 2.0);
+  EXPECT_NEAR(mendings.back().log_factor, std::log(4.0), 0.15);
+  drive.watch().NoteMended();
+  drive.Go(60, 0.04);
+  EXPECT_TRUE(drive.watch().Mendings().empty());
+  EXPECT_EQ(drive.watch().ScaleFall(), 0.0);
+  EXPECT_NEAR(*drive.watch().height() / (0.04 * SyntheticRoad::kHeight_m), 1.0, 0.05);
+}
+
+// What rises for a moment is a road that falls away.
+TEST(GroundWatch, MendsAScaleThatHasRisenOnlyIfItStaysForLong) {
+  Drive drive;
+  drive.Go(100, 0.04);
+  drive.Go(40, 0.12);
+  EXPECT_TRUE(drive.watch().Mendings().empty());
+  drive.Go(40, 0.12);
+  const std::vector<ScaleMending> mendings = drive.watch().Mendings();
+  ASSERT_FALSE(mendings.empty());
+  EXPECT_NEAR(static_cast<double>(mendings.front().keyframe.value), 20.0, 2.0);
+  EXPECT_NEAR(mendings.back().log_factor, -std::log(3.0), 0.15);
+}
+
+TEST(GroundWatch, MendsNothingOfAWayThatIsForgotten) {
+  Drive drive;
+  drive.Go(100, 0.04);
+  drive.Go(40, 0.01);
+  drive.watch().ForgetSteps();
+  EXPECT_TRUE(drive.watch().Mendings().empty());
+  drive.Go(40, 0.01);
+  ASSERT_FALSE(drive.watch().Mendings().empty()) << "the height is known";
+  EXPECT_GT(drive.watch().Mendings().front().keyframe, KeyframeId{27});
 }
 
 TEST(GroundWatch, TellsTheLengthOfAStepAfterAGap) {

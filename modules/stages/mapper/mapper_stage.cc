@@ -85,6 +85,7 @@ void MapperStage::Advance() {
   context_.SetValue("keyframes", static_cast<double>(map.keyframes().size()));
   context_.SetValue("landmarks", static_cast<double>(map.landmarks().size()));
   context_.SetValue("loops", static_cast<double>(map.closed_loops().size()));
+  context_.SetValue("scale_mendings", static_cast<double>(session_.num_scale_mendings()));
   context_.SetValue("focal_error", session_.lens_refiner().error());
   context_.SetValue("lens_radial", session_.map().lens().radial);
   context_.SetValue("focal_doubt", session_.lens_refiner().doubt());

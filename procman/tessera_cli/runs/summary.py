@@ -117,6 +117,7 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         + drop_warnings(evaluated, result)
         + latency_warnings(result)
         + scale_warnings(result.frames, facts.sensor)
+        + mending_warnings(evaluated)
         + agreement_warnings(result.frames, facts.sensor)
         + focal_warnings(evaluated),
         "doubts": scale_doubts(result.frames),
@@ -250,6 +251,17 @@ def scale_warnings(frames: Frames | None, sensor: str) -> list[str]:
     return [*sentences[:MAX_SCALE_WARNINGS], last]
 
 
+def mending_warnings(evaluated: dict[str, Any]) -> list[str]:
+    """Whether the scale of a mono map slipped and was mended by what the ground shows."""
+    times = int(evaluated.get("stage_values", {}).get("mapper", {}).get("scale_mendings", 0))
+    if times == 0:
+        return []
+    return [
+        f"The scale slipped, as the ground below the camera shows, and was mended {_times(times)}: keyframes and "
+        "trajectory.txt are right again to a tenth or two, what was estimated live before is not."
+    ]
+
+
 def agreement_warnings(frames: Frames | None, sensor: str) -> list[str]:
     """Of a run whose images and poses do not fit well: the camera may not be what its calibration says."""
     if frames is None:
@@ -304,8 +316,12 @@ def _where(stretch: list[int]) -> str:
     return f"at frame {stretch[0]}" if len(stretch) == 1 else f"between frames {stretch[0]} and {stretch[-1]}"
 
 
+def _times(number: int) -> str:
+    return "once" if number == 1 else f"{number} times"
+
+
 def _contradiction(stretch: list[int], sensor: str) -> str:
-    times = "once" if len(stretch) == 1 else f"{len(stretch)} times"
+    times = _times(len(stretch))
     if sensor == "mono":
         what, consequence = "The scale may have slipped", "what follows may lie on another scale"
     else:

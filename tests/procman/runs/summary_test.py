@@ -16,6 +16,7 @@ from tessera_cli.runs.summary import (
     is_trustworthy,
     judge_end,
     latency_warnings,
+    mending_warnings,
     occupancy_sha256,
     occupancy_warnings,
     recording_warnings,
@@ -121,6 +122,13 @@ def test_focal_lengths_that_no_calibration_explains_are_a_warning() -> None:
     assert focal_warnings({}) == focal_warnings({"stage_values": {"mapper": {"focal_doubt": 0.0}}}) == []
     (sentence,) = focal_warnings({"stage_values": {"mapper": {"focal_doubt": -0.046}}})
     assert "4.6 % shorter" in sentence and "not used" in sentence
+
+
+def test_a_scale_that_was_mended_is_told() -> None:
+    assert mending_warnings({}) == mending_warnings({"stage_values": {"mapper": {"scale_mendings": 0.0}}}) == []
+    (once,) = mending_warnings({"stage_values": {"mapper": {"scale_mendings": 1.0}}})
+    (thrice,) = mending_warnings({"stage_values": {"mapper": {"scale_mendings": 3.0}}})
+    assert "mended once" in once and "mended 3 times" in thrice
 
 
 def _live_result(latency_ms: np.ndarray, source: str = "kitti:/x", newest_wins: bool = True) -> Result:
