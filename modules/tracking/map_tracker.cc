@@ -17,6 +17,7 @@ namespace {
 constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
 constexpr double kLongLost_s = 2.0;      // since the last pose: the camera may be where nothing is known of
 constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
+constexpr double kDriftInterval_s = 0.1;
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // What a camera that stood goes until the next frame, in the image: a standard deviation.
 constexpr double kStart_px = 1.0;
@@ -94,7 +95,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   } else if (before == State::kInitializing) {
     result.pose.state = Start(view, result.keyframes) ? TrackingState::kTracked : TrackingState::kInitializing;
   } else {
-    const bool has_started = NoteLoss(features.utime_us) && Start(view, result.keyframes);
+    const bool has_started = NoteLoss(view) && Start(view, result.keyframes);
     result.pose.state = has_started ? TrackingState::kTracked : TrackingState::kLost;
   }
   if (result.pose.state == TrackingState::kTracked) DescribePose(result);
@@ -301,20 +302,21 @@ bool MapTracker::StartFromDepth(const Frame& view, std::vector<KeyframeObservati
   for (int i = 0; i < view->size(); ++i) num_points += view->observation(i).has_right() ? 1 : 0;
   if (num_points < options_.min_start_points) return false;
   reference_ = {};
-  last_.emplace(TrackedFrame(view), start_.world_from_start());
-  last_->frame.world_from_camera = start_.world_from_start();
+  const Rigid3 world_from_camera = lost_way_.PoseAt(view->features().utime_us);
+  last_.emplace(TrackedFrame(view), world_from_camera);
+  last_->frame.world_from_camera = world_from_camera;
   keyframes.push_back(MakeKeyframe(*last_));
   return true;
 }
 
 // Both frames become keyframes; the points go with the second one, as seen by a keypoint of each.
 bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
-  const std::optional<MonoStart> start = start_.Add(view, tracked_utime_us_, ground_);
+  const std::optional<MonoStart> start = start_.Add(view, {lost_way_.speed(), tracked_utime_us_}, ground_);
   if (!start) return false;
   reference_ = {};
   scale_.Restart();
   ground_.ForgetSteps();
-  const Rigid3& world_from_first = start_.world_from_start();
+  const Rigid3 world_from_first = lost_way_.PoseAt(start->first->features().utime_us);
   LocalizedFrame first{TrackedFrame(start->first), world_from_first};
   first.frame.world_from_camera = world_from_first;
   const KeyframeId first_id = next_keyframe_;
@@ -338,16 +340,29 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
 }
 
 // Whether the loss has lasted so long that a new part of the map should begin.
-bool MapTracker::NoteLoss(int64_t utime_us) {
+bool MapTracker::NoteLoss(const Frame& view) {
+  const int64_t utime_us = view->features().utime_us;
   if (!lost_since_us_) lost_since_us_ = utime_us;
+  if (last_ && !lost_way_.has_begun()) BeginLostWay();
+  if (lost_way_.has_begun()) lost_way_.Add(view);
   const int64_t max_unlocated_us = tracked_utime_us_ ? 0 : options_.max_unlocated_us;
   const int64_t max_lost_us = std::max(options_.max_lost_us, max_unlocated_us);
   if (utime_us - *lost_since_us_ <= max_lost_us || !options_.makes_keyframes) return false;
   if (last_) {
-    start_.BeginAfter(last_->frame, motion_, WorldFromReference());
     last_.reset();
+    start_.Restart();
   }
   return true;
+}
+
+void MapTracker::BeginLostWay() {
+  const auto motion = motion_.Predict(kDriftInterval_s, Eigen::Quaterniond::Identity());
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  if (motion && motion->is_steady) {
+    velocity = WorldFromReference().scale * motion->last_from_current.translation / kDriftInterval_s;
+  }
+  const Eigen::Vector3d turn_rate = motion_.is_known() ? motion_.turn_rate() : Eigen::Vector3d::Zero();
+  lost_way_.Begin(last_->frame.view, last_->frame.world_from_camera, velocity, turn_rate);
 }
 
 void MapTracker::ForgetMotion() {
@@ -443,6 +458,7 @@ void MapTracker::CountPoints(PoseEstimate& pose) const {
 // The frame was tracked, and is now the last one.
 void MapTracker::DescribePose(MapTrackingResult& result) {
   lost_since_us_.reset();
+  lost_way_.End();
   result.pose.world_from_camera = last_->frame.world_from_camera;
   result.pose.reference_keyframe = reference_.id;
   result.pose.reference_from_camera = last_->reference_from_camera;

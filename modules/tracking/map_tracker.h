@@ -23,6 +23,7 @@
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/localized_frame.h"
+#include "tracking/lost_way.h"
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
 #include "tracking/part_start.h"
@@ -107,7 +108,8 @@ class MapTracker {
   bool Start(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
-  bool NoteLoss(int64_t utime_us);
+  bool NoteLoss(const Frame& view);
+  void BeginLostWay();
   void ForgetMotion();
 
   bool IsKeyframeDue();
@@ -137,6 +139,7 @@ class MapTracker {
   int64_t previous_utime_us_ = 0;            // of the frame before
   std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
+  LostWay lost_way_;  // since the last frame with a pose
   Frame asked_;  // the frame that asked last
 };
 
