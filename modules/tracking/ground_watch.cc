@@ -28,6 +28,13 @@ constexpr double kMaxBend = 0.5;   // of the logarithm of the height
 constexpr int kNumFirstSteps = 200, kStepsBetween = 4;
 constexpr double kPairEvidence = 8.0;  // what one step may say if it is all there is
 constexpr double kMaxLengthSigma = 0.3;
+constexpr double kMinMending = 0.1;  // of the logarithm: less is what roads do to heights
+
+double ShareNear(const std::vector<double>& log_heights, double log_height) {
+  const auto num_near =
+      std::ranges::count_if(log_heights, [&](double height) { return std::abs(height - log_height) < kNear; });
+  return static_cast<double>(num_near) / static_cast<double>(log_heights.size());
+}
 
 }  // namespace
 
@@ -57,15 +64,21 @@ void GroundWatch::Rescale(double factor) {
   if (log_height_) *log_height_ += change;
 }
 
-void GroundWatch::ForgetHeight() {
+void GroundWatch::BeginPart(KeyframeId first, bool is_guess) {
   ForgetSteps();
-  log_height_.reset();
+  if (is_guess && log_height_) estimate_ = Estimate{first, kNumLatest};
 }
 
 void GroundWatch::ForgetSteps() {
   steps_.clear();
   log_heights_.clear();
   num_elsewhere_ = 0;
+  estimate_.reset();
+}
+
+void GroundWatch::ForgetHeight() {
+  ForgetSteps();
+  log_height_.reset();
 }
 
 std::optional<double> GroundWatch::LengthAfterGap(const FrameView& last, const FrameView& current,
@@ -84,31 +97,38 @@ double GroundWatch::ScaleFall() const {
   return fall > kMaxBend ? fall : 0.0;
 }
 
-bool GroundWatch::HasFallenAndStays() const {
-  if (ScaleFall() == 0.0) return false;
-  const auto half = log_heights_.end() - kNumLatest / 2;
-  const double change =
-      OrderStatistic({half, log_heights_.end()}, 0.5) - OrderStatistic({log_heights_.end() - kNumLatest, half}, 0.5);
+// Whether the last heights stay about as they are.
+bool GroundWatch::HasSettled(size_t num_heights) const {
+  if (!log_height_ || log_heights_.size() < num_heights || !speed_.is_plausible()) return false;
+  const auto last = static_cast<std::ptrdiff_t>(num_heights), half = last / 2;
+  const double before = OrderStatistic({log_heights_.end() - last, log_heights_.end() - half}, 0.5);
+  const double change = OrderStatistic({log_heights_.end() - half, log_heights_.end()}, 0.5) - before;
   return std::abs(change) < kSettled;
 }
 
+// Whether the height was another one for so long that no road explains it.
 bool GroundWatch::IsElsewhereForLong() const {
   if (!log_height_ || num_elsewhere_ < static_cast<int>(kMinHeights)) return false;
   const std::vector<double> last(log_heights_.end() - kMinHeights, log_heights_.end());
   const double median = OrderStatistic(last, 0.5);
-  const auto num_near = std::ranges::count_if(last, [&](double height) { return std::abs(height - median) < kNear; });
-  return std::abs(median - *log_height_) > kMaxBend && static_cast<double>(num_near) >= kMinShareNear * kMinHeights;
+  return std::abs(median - *log_height_) > kMaxBend && ShareNear(last, median) >= kMinShareNear;
 }
 
 std::vector<ScaleMending> GroundWatch::Mendings() const {
-  if (!HasFallenAndStays() && !IsElsewhereForLong()) return {};
+  if (estimate_ && HasSettled(estimate_->num_heights)) {
+    const double log_factor = *log_height_ - OrderStatistic({log_heights_.begin(), log_heights_.end()}, 0.5);
+    if (std::abs(log_factor) > kMinMending) return {{estimate_->since, log_factor}};
+  }
+  if ((ScaleFall() == 0.0 || !HasSettled(kNumLatest)) && !IsElsewhereForLong()) return {};
   return MendingsOf(steps_, *log_height_);
 }
 
-void GroundWatch::NoteMended() {
+void GroundWatch::NoteMended(KeyframeId since) {
+  if (!log_height_) return;
   steps_.resize(NumSound(steps_, *log_height_));
   log_heights_.clear();
   num_elsewhere_ = 0;
+  estimate_ = Estimate{since, kMinHeights};
 }
 
 std::optional<double> GroundWatch::height() const {
@@ -159,11 +179,10 @@ void GroundWatch::LearnHeight(double log_height) {
   }
   if (log_height_ || log_heights_.size() < kMinHeights) return;
   const double median = OrderStatistic({log_heights_.begin(), log_heights_.end()}, 0.5);
-  const auto num_near =
-      std::ranges::count_if(log_heights_, [&](double height) { return std::abs(height - median) < kNear; });
-  if (static_cast<double>(num_near) < kMinShareNear * static_cast<double>(log_heights_.size())) return;
+  const double share_near = ShareNear({log_heights_.begin(), log_heights_.end()}, median);
+  if (share_near < kMinShareNear) return;
   log_height_ = median;
-  num_in_height_ = static_cast<int>(num_near);
+  num_in_height_ = static_cast<int>(share_near * static_cast<double>(log_heights_.size()) + 0.5);
   num_elsewhere_ = 0;
 }
 

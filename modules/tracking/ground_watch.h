@@ -33,10 +33,12 @@ class GroundWatch {
   void Add(const FrameView& last, const FrameView& current, const Step& step);
   // Units of the map have become smaller by this factor: a loop has scaled what is around.
   void Rescale(double factor);
-  // Another part of the map begins, of which nothing tells the scale.
-  void ForgetHeight();
+  // Another part of the map begins with the camera still as high. `is_guess`: its scale is, until it is mended.
+  void BeginPart(KeyframeId first, bool is_guess);
   // The way goes on from an earlier place of this part.
   void ForgetSteps();
+  // It goes on in another part, of whose scale nothing is known.
+  void ForgetHeight();
 
   // The length in units of the map of a step between two frames at the end of `gap_s` >= 0 in which the ground was not
   // seen; only the direction of `last_from_current` matters. nullopt: the ground doesn't tell it.
@@ -51,8 +53,9 @@ class GroundWatch {
   // What mends the map where its scale has slipped, once it stays as it is: it has fallen so clearly (ScaleFall), or
   // was another one for long. Empty: there is nothing to mend, or not yet.
   std::vector<ScaleMending> Mendings() const;
-  // The map has been mended so.
-  void NoteMended();
+  // The map has been mended so. `since`: the last keyframe that was named. From there on the scale is an estimate,
+  // which gets better as more of the ground is seen.
+  void NoteMended(KeyframeId since);
 
   // The height of the camera in units of the map; nullopt: not known, or not constant.
   std::optional<double> height() const;
@@ -60,7 +63,7 @@ class GroundWatch {
  private:
   void LearnDirection(const Eigen::Vector3d& direction);
   void LearnHeight(double log_height);
-  bool HasFallenAndStays() const;
+  bool HasSettled(size_t num_heights) const;
   bool IsElsewhereForLong() const;
   Eigen::Vector3d Direction(const Step& step, const Eigen::Vector3d& seen) const;
   std::optional<Eigen::Vector3d> Down() const;
@@ -76,7 +79,12 @@ class GroundWatch {
   std::deque<double> log_heights_;  // the last ones
   std::optional<double> log_height_;
   int num_in_height_ = 0;  // heights that it is the mean of
-  int num_elsewhere_ = 0;  // the last ones that were far from it, without one between them that was not
+  struct Estimate {
+    KeyframeId since;
+    size_t num_heights = 0;  // that make a better one
+  };
+  std::optional<Estimate> estimate_;  // the scale is one
+  int num_elsewhere_ = 0;             // the last ones that were far from it, without one between them that was not
 };
 
 }  // namespace tessera

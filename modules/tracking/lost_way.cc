@@ -64,7 +64,7 @@ std::optional<Eigen::Quaterniond> LostWay::TurnTo(const FrameView& view, const E
   }
   const auto seed = static_cast<uint64_t>(view.features().frame.value);
   const std::optional<TwoViewResult> motion = EstimateTwoView(camera, pairs, seed, two_view, guesses);
-  //DEBUG
+  // DEBUG
   if (!motion || motion->num_points < two_view.min_points) return std::nullopt;
   return motion->second_from_first.rotation.conjugate();
 }

@@ -14,9 +14,9 @@
 namespace tessera {
 namespace {
 
-constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
-constexpr double kLongLost_s = 2.0;      // since the last pose: the camera may be where nothing is known of
-constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
+constexpr double kMinCoverage = 0.4;  // see Coverage(): of a pose that no try has found clearly
+constexpr double kLongLost_s = 2.0;   // since the last pose: the camera may be where nothing is known of
+constexpr int kFewInliers = 100;      // that agree with a pose: what two frames as such show counts more
 constexpr double kDriftInterval_s = 0.1;
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // What a camera that stood goes until the next frame, in the image: a standard deviation.
@@ -114,9 +114,9 @@ void MapTracker::UpdateLast() {
   decision_.Renew(replica_);
   reference_.RenewPoints(replica_);
   if (const std::optional<Sim3> world_from_reference = replica_.WorldFromKeyframe(reference_.id)) {
-    if (mends_scale_.valid() && !replica_.sent().contains(mends_scale_)) {
-      ground_.NoteMended();
-      mends_scale_ = {};
+    if (mending_ && !replica_.sent().contains(mending_->keyframe)) {
+      ground_.NoteMended(mending_->since);
+      mending_.reset();
     } else {
       ground_.Rescale(world_from_reference->scale / reference_.scale);
     }
@@ -157,6 +157,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
     ground_.ForgetHeight();
   }
   ground_.ForgetSteps();
+  mending_.reset();
   reference_ = ReferenceKeyframe{.id = answer.reference, .scale = world_from_reference->scale};
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
@@ -311,11 +312,12 @@ bool MapTracker::StartFromDepth(const Frame& view, std::vector<KeyframeObservati
 
 // Both frames become keyframes; the points go with the second one, as seen by a keypoint of each.
 bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
-  const std::optional<MonoStart> start = start_.Add(view, {lost_way_.speed(), tracked_utime_us_}, ground_);
+  const std::optional<MonoStart> start =
+      start_.Add(view, {lost_way_.speed(), tracked_utime_us_}, next_keyframe_, ground_);
   if (!start) return false;
   reference_ = {};
+  mending_.reset();
   scale_.Restart();
-  ground_.ForgetSteps();
   const Rigid3 world_from_first = lost_way_.PoseAt(start->first->features().utime_us);
   LocalizedFrame first{TrackedFrame(start->first), world_from_first};
   first.frame.world_from_camera = world_from_first;
@@ -392,9 +394,9 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
   const KeyframeId id = next_keyframe_;
   const bool begins_part = !reference_.id.valid();
   KeyframeObservation keyframe = ObserveKeyframe(id, localized, calibration_, reference_, replica_);
-  if (!begins_part && !mends_scale_.valid()) {
+  if (!begins_part && !mending_) {
     keyframe.mendings = ground_.Mendings();
-    if (!keyframe.mendings.empty()) mends_scale_ = id;
+    if (!keyframe.mendings.empty()) mending_ = {id, keyframe.mendings.back().keyframe};
   }
   SentKeyframe sent{reference_.id, localized.reference_from_camera, {}};
   // Points that one view alone knows are no measure of what should be seen again, unless there are no others.

@@ -93,6 +93,12 @@ class MapTracker {
   bool has_map() const { return replica_.map().keyframes().size() > 0; }
   Sim3 WorldFromReference() const { return reference_.WorldFromKeyframe(replica_); }
 
+  // KeyframeObservation::mendings.
+  struct SentMending {
+    KeyframeId keyframe;  // that brings them
+    KeyframeId since;     // that the last of them names
+  };
+
   void UpdateLast();
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
@@ -135,12 +141,12 @@ class MapTracker {
   WayCorrections way_corrections_;
   ScaleWatch scale_;                         // mono
   GroundWatch ground_;                       // mono; in units of the world
-  KeyframeId mends_scale_;                   // the keyframe that brings what mends it; invalid: none is on its way
+  std::optional<SentMending> mending_;       // on its way to the mapper
   int64_t previous_utime_us_ = 0;            // of the frame before
   std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
   LostWay lost_way_;  // since the last frame with a pose
-  Frame asked_;  // the frame that asked last
+  Frame asked_;       // the frame that asked last
 };
 
 }  // namespace tessera

@@ -15,30 +15,25 @@ void Scale(double factor, MonoStart& start) {
   }
 }
 
-std::optional<double> LengthOf(const MonoStart& start, const KnownSpeed& speed, GroundWatch& ground) {
-  const double interval_s = start.interval_s();
-  if (interval_s <= 0.0) return std::nullopt;
-  std::optional<double> length;
-  if (speed.tracked_utime_us) {
-    const double gap_s = SecondsOf(start.first->features().utime_us - *speed.tracked_utime_us);
-    length = ground.LengthAfterGap(*start.first, *start.second, start.second_from_first.Inverse(), interval_s,
-                                   std::max(gap_s, 0.0));
-  }
-  if (!length && speed.before_loss > 0.0) length = speed.before_loss * interval_s;
-  return length;
+std::optional<double> LengthByGround(const MonoStart& start, std::optional<int64_t> tracked_utime_us,
+                                     GroundWatch& ground) {
+  if (!tracked_utime_us || start.interval_s() <= 0.0) return std::nullopt;
+  const double gap_s = SecondsOf(start.first->features().utime_us - *tracked_utime_us);
+  return ground.LengthAfterGap(*start.first, *start.second, start.second_from_first.Inverse(), start.interval_s(),
+                               std::max(gap_s, 0.0));
 }
 
 }  // namespace
 
-std::optional<MonoStart> PartStart::Add(const Frame& view, const KnownSpeed& speed, GroundWatch& ground) {
+std::optional<MonoStart> PartStart::Add(const Frame& view, const KnownSpeed& speed, KeyframeId first,
+                                        GroundWatch& ground) {
   std::optional<MonoStart> start = initializer_.Add(view);
   if (!start) return std::nullopt;
   Restart();
-  if (const std::optional<double> length = LengthOf(*start, speed, ground)) {
-    Scale(*length / start->second_from_first.translation.norm(), *start);
-  } else {
-    ground.ForgetHeight();
-  }
+  const std::optional<double> by_ground = LengthByGround(*start, speed.tracked_utime_us, ground);
+  const double length = by_ground.value_or(speed.before_loss * start->interval_s());
+  if (length > 0.0) Scale(length / start->second_from_first.translation.norm(), *start);
+  ground.BeginPart(first, !by_ground);
   return start;
 }
 

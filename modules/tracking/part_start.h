@@ -12,7 +12,7 @@ namespace tessera {
 
 // How far the camera goes, if something is known of that.
 struct KnownSpeed {
-  double before_loss = 0.0;               // units/s; 0: unknown
+  double before_loss = 0.0;                 // units/s; 0: unknown
   std::optional<int64_t> tracked_utime_us;  // of the last frame with a pose
 };
 
@@ -24,10 +24,10 @@ class PartStart {
 
   // Forgets the frames that Add() has seen.
   void Restart() { initializer_ = MonoInitializer(options_); }
-  // Two frames that together give a motion and points. They don't know how far apart they are: as far as the ground
-  // tells, or as the camera goes in that time, if it still moves as it did when it was lost. That is a guess until a
-  // loop joins the parts.
-  std::optional<MonoStart> Add(const Frame& view, const KnownSpeed& speed, GroundWatch& ground);
+  // Two frames that together give a motion and points, and become keyframes, `first` being the older one's number. They
+  // don't know how far apart they are: as far as the ground tells, or as the camera goes in that time, if it still
+  // moves as it did when it was lost. That is a guess until the ground tells it or a loop joins the parts.
+  std::optional<MonoStart> Add(const Frame& view, const KnownSpeed& speed, KeyframeId first, GroundWatch& ground);
 
  private:
   InitializerOptions options_;

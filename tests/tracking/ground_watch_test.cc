@@ -80,7 +80,7 @@ TEST(GroundWatch, MendsAScaleThatHasFallenOnceItStays) {
   ASSERT_FALSE(mendings.empty());
   EXPECT_NEAR(static_cast<double>(mendings.front().keyframe.value), 20.0, 2.0);
   EXPECT_NEAR(mendings.back().log_factor, std::log(4.0), 0.15);
-  drive.watch().NoteMended();
+  drive.watch().NoteMended(mendings.back().keyframe);
   drive.Go(60, 0.04);
   EXPECT_TRUE(drive.watch().Mendings().empty());
   EXPECT_EQ(drive.watch().ScaleFall(), 0.0);
@@ -98,6 +98,37 @@ TEST(GroundWatch, MendsAScaleThatHasRisenOnlyIfItStaysForLong) {
   ASSERT_FALSE(mendings.empty());
   EXPECT_NEAR(static_cast<double>(mendings.front().keyframe.value), 20.0, 2.0);
   EXPECT_NEAR(mendings.back().log_factor, -std::log(3.0), 0.15);
+}
+
+TEST(GroundWatch, BringsAPartWhoseScaleIsAGuessToThatOfTheOneBefore) {
+  for (const double units : {0.15, 0.05, 0.01}) {
+    Drive drive;
+    drive.Go(100, 0.04);
+    drive.watch().BeginPart({21}, true);
+    drive.Go(10, units);
+    EXPECT_TRUE(drive.watch().Mendings().empty()) << "too soon";
+    drive.Go(20, units);
+    const std::vector<ScaleMending> mendings = drive.watch().Mendings();
+    ASSERT_EQ(mendings.size(), 1U);
+    EXPECT_EQ(mendings.front().keyframe, KeyframeId{21});
+    EXPECT_NEAR(mendings.front().log_factor, std::log(0.04 / units), 0.1);
+    drive.watch().NoteMended({21});
+    drive.Go(40, 0.03);
+    EXPECT_TRUE(drive.watch().Mendings().empty()) << "nearly right, and a better estimate takes longer";
+    drive.Go(30, 0.03);
+    const std::vector<ScaleMending> better = drive.watch().Mendings();
+    ASSERT_EQ(better.size(), 1U);
+    EXPECT_EQ(better.front().keyframe, KeyframeId{21});
+    EXPECT_NEAR(better.front().log_factor, std::log(0.04 / 0.03), 0.08);
+  }
+}
+
+TEST(GroundWatch, LeavesAPartAloneWhoseFirstStepTheGroundHasTold) {
+  Drive drive;
+  drive.Go(100, 0.04);
+  drive.watch().BeginPart({21}, false);
+  drive.Go(40, 0.03);
+  EXPECT_TRUE(drive.watch().Mendings().empty());
 }
 
 TEST(GroundWatch, MendsNothingOfAWayThatIsForgotten) {

@@ -17,7 +17,7 @@ class PartStartTest : public testing::Test {
   }
   std::optional<MonoStart> StartFrom(int64_t first_step, const KnownSpeed& speed) {
     for (int64_t step = first_step; step < first_step + 15; ++step) {
-      if (auto start = start_.Add(Take(step), speed, ground_)) return start;
+      if (auto start = start_.Add(Take(step), speed, KeyframeId{3}, ground_)) return start;
     }
     return std::nullopt;
   }
@@ -49,7 +49,7 @@ TEST_F(PartStartTest, AfterALossTheCameraGoesAsFastAsItDid) {
 
 TEST_F(PartStartTest, BeginsAfreshAfterARestart) {
   StartFrom(0, {});
-  (void)start_.Add(Take(20), {}, ground_);
+  (void)start_.Add(Take(20), {}, KeyframeId{3}, ground_);
   start_.Restart();
   const auto start = StartFrom(30, {});
   ASSERT_TRUE(start.has_value());
