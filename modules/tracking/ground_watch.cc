@@ -128,7 +128,8 @@ void GroundWatch::NoteMended(KeyframeId since) {
   steps_.resize(NumSound(steps_, *log_height_));
   log_heights_.clear();
   num_elsewhere_ = 0;
-  estimate_ = Estimate{since, kMinHeights};
+  const bool is_better_one = estimate_ && estimate_->since == since && estimate_->num_heights == kMinHeights;
+  estimate_ = is_better_one ? std::nullopt : std::optional(Estimate{since, kMinHeights});
 }
 
 std::optional<double> GroundWatch::height() const {
@@ -170,7 +171,10 @@ std::optional<Eigen::Vector3d> GroundWatch::Down() const {
 // been near to for long is another one.
 void GroundWatch::LearnHeight(double log_height) {
   log_heights_.push_back(log_height);
-  if (log_heights_.size() > kNumHeights) log_heights_.pop_front();
+  if (log_heights_.size() > kNumHeights) {
+    log_heights_.pop_front();
+    estimate_.reset();  // it was as good as can be
+  }
   if (log_height_) {
     const bool is_near = std::abs(log_height - *log_height_) < kNear;
     num_elsewhere_ = is_near ? 0 : num_elsewhere_ + 1;

@@ -83,7 +83,7 @@ class GroundWatch {
     KeyframeId since;
     size_t num_heights = 0;  // that make a better one
   };
-  std::optional<Estimate> estimate_;  // the scale is one
+  std::optional<Estimate> estimate_;  // the scale is one, and may be off
   int num_elsewhere_ = 0;             // the last ones that were far from it, without one between them that was not
 };
 

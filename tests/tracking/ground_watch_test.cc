@@ -120,6 +120,9 @@ TEST(GroundWatch, BringsAPartWhoseScaleIsAGuessToThatOfTheOneBefore) {
     ASSERT_EQ(better.size(), 1U);
     EXPECT_EQ(better.front().keyframe, KeyframeId{21});
     EXPECT_NEAR(better.front().log_factor, std::log(0.04 / 0.03), 0.08);
+    drive.watch().NoteMended({21});
+    drive.Go(90, 0.035);
+    EXPECT_TRUE(drive.watch().Mendings().empty()) << "enough of it";
   }
 }
 

@@ -28,10 +28,11 @@ class CommandRunner:
         folder: Path,
         environment: dict[str, str],
         look: Callable[[str], None],
+        run_folder: Path | None = None,
     ) -> float:
         """CPU seconds of the command and its descendants, when it has ended with status 0, or as a run in doubt.
 
-        `look` gets the last line of its output, again and again.
+        `look` gets the last line of its output, again and again. `run_folder`: that it writes, if it is a run.
         Raises UserError or RunError, with its last line and the log's path, if it failed; KeyboardInterrupt if
         interrupted, when it and its descendants have ended.
         """
@@ -50,7 +51,7 @@ class CommandRunner:
                 deputy.step()
         except RunError:
             # A run whose scale may have slipped is a result, too.
-            summary = read_complete(folder)
+            summary = read_complete(run_folder) if run_folder is not None else None
             if summary is None or not summary.get("doubts"):
                 raise
         finally:

@@ -109,7 +109,8 @@ def _run(
     here, options = this_checkout(), RunOptions(arguments.extractors, arguments.frames, arguments.port)
     words = [*options.words(sequence, source, path), "--force"]
     chosen = ",".join(map(str, sorted(os.sched_getaffinity(0))[:cores]))
-    commands.run(path.name, ["taskset", "-c", chosen, *here.words, *words], here.folder, here.environment, view.look)
+    words = ["taskset", "-c", chosen, *here.words, *words]
+    commands.run(path.name, words, here.folder, here.environment, view.look, path)
     summary: Summary = json.loads((path / "summary.json").read_text())
     return summary
 

@@ -86,7 +86,7 @@ def _run(condition: Condition, arguments: Namespace, commands: CommandRunner, fo
     here, options = this_checkout(), RunOptions(condition.extractors, arguments.frames, arguments.port)
     words = options.words(condition.sequence, condition.sequence.source, folder)
     words += ["--live", "--pace", str(condition.rate), "--tiles", condition.tiles]
-    commands.run(condition.name, [*here.words, *words], here.folder, here.environment, lambda _: None)
+    commands.run(condition.name, [*here.words, *words], here.folder, here.environment, lambda _: None, folder)
 
 
 def _row(condition: Condition, folder: Path) -> str:

@@ -96,5 +96,5 @@ class ExperimentRunner:
         """CPU seconds of the whole command. What an interrupted run left in `path` goes."""
         shutil.rmtree(path, ignore_errors=True)
         return self._commands.run(
-            name, [*checkout.words, *words], checkout.folder, checkout.environment, self._view.look
+            name, [*checkout.words, *words], checkout.folder, checkout.environment, self._view.look, path
         )

@@ -19,10 +19,13 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Interrupt:
     return Interrupt()
 
 
-def run(folder: Path, interrupt: Interrupt, script: str, **environment: str) -> list[str]:
+def run(
+    folder: Path, interrupt: Interrupt, script: str, run_folder: Path | None = None, **environment: str
+) -> list[str]:
     """The last lines that were seen while it ran."""
     lines: list[str] = []
-    CommandRunner(folder, interrupt).run("script", ["sh", "-c", script], folder, environment, lines.append)
+    words = ["sh", "-c", script]
+    CommandRunner(folder, interrupt).run("script", words, folder, environment, lines.append, run_folder)
     return lines
 
 
@@ -56,14 +59,21 @@ def test_arguments_at_fault_stay_a_user_error(tmp_path: Path, interrupt: Interru
 
 
 def test_a_run_that_doubts_its_scale_is_a_result(tmp_path: Path, interrupt: Interrupt) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run/summary.json").write_text('{"ended": "complete", "doubts": ["The scale may have slipped."]}')
+    run(tmp_path, interrupt, "exit 1", tmp_path / "run")
+
+
+def test_a_doubt_of_another_run_is_none_of_this_one(tmp_path: Path, interrupt: Interrupt) -> None:
     (tmp_path / "summary.json").write_text('{"ended": "complete", "doubts": ["The scale may have slipped."]}')
-    run(tmp_path, interrupt, "exit 1")
+    with pytest.raises(RunError):
+        run(tmp_path, interrupt, "exit 1", tmp_path / "run")
 
 
 def test_a_run_that_failed_without_doubts_is_a_failure(tmp_path: Path, interrupt: Interrupt) -> None:
     (tmp_path / "summary.json").write_text('{"ended": "complete", "doubts": []}')
     with pytest.raises(RunError):
-        run(tmp_path, interrupt, "exit 1")
+        run(tmp_path, interrupt, "exit 1", tmp_path)
 
 
 def test_a_missing_program_is_a_failure(tmp_path: Path, interrupt: Interrupt) -> None:

@@ -66,7 +66,7 @@ class StackRunner:
 
         before, deputies_s = self._traffic(), self._nodes.cpu_s()
         try:
-            cpu_s = self._commands.run(job.name, words, job.path, self._nodes.environment, look_at_both)
+            cpu_s = self._commands.run(job.name, words, job.path, self._nodes.environment, look_at_both, job.path)
         finally:
             fault.end()
         traffic = {host: after - before[host] for host, after in self._traffic().items()}

@@ -164,7 +164,9 @@ class _Series:
                 self._view.look(f"{len(thrower.thrown)} faults; {line}" if most else line)
 
             try:
-                self._commands.run(run.name, [*checkout.words, *words], checkout.folder, checkout.environment, look)
+                self._commands.run(
+                    run.name, [*checkout.words, *words], checkout.folder, checkout.environment, look, path
+                )
             except (RunError, UserError) as error:
                 log = self._folder.logs / f"{run.name}.log"
                 failure = str(error).rpartition(f"{log}: ")[2].removeprefix("tessera: ")  # what the command said
