@@ -51,16 +51,22 @@ class GroundWatch {
   double ScaleFall() const;
 
   // What mends the map where its scale has slipped, once it stays as it is: it has fallen so clearly (ScaleFall), or
-  // was another one for long. Empty: there is nothing to mend, or not yet.
+  // was another one for long. And what brings a part whose scale is a guess to that of the part before. Empty: there is
+  // nothing to mend, or not yet.
   std::vector<ScaleMending> Mendings() const;
-  // The map has been mended so. `since`: the last keyframe that was named. From there on the scale is an estimate,
-  // which gets better as more of the ground is seen.
+  // The map has been mended so. `since`: the last keyframe that was named. From there on the scale is an estimate, of
+  // which a better one follows when more of the ground has been seen.
   void NoteMended(KeyframeId since);
 
   // The height of the camera in units of the map; nullopt: not known, or not constant.
   std::optional<double> height() const;
 
  private:
+  struct Estimate {
+    KeyframeId since;
+    size_t num_heights = 0;  // that make a better one
+  };
+
   void LearnDirection(const Eigen::Vector3d& direction);
   void LearnHeight(double log_height);
   bool HasSettled(size_t num_heights) const;
@@ -78,11 +84,7 @@ class GroundWatch {
   std::vector<GroundStep> steps_;   // the last ones, of one way through this part of the map
   std::deque<double> log_heights_;  // the last ones
   std::optional<double> log_height_;
-  int num_in_height_ = 0;  // heights that it is the mean of
-  struct Estimate {
-    KeyframeId since;
-    size_t num_heights = 0;  // that make a better one
-  };
+  int num_in_height_ = 0;             // heights that it is the mean of
   std::optional<Estimate> estimate_;  // the scale is one, and may be off
   int num_elsewhere_ = 0;             // the last ones that were far from it, without one between them that was not
 };

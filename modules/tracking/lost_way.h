@@ -1,5 +1,5 @@
 // The way of a camera since it was lost: it turned as consecutive frames show, and went on as fast as it did, straight
-// ahead in its own axes. A guess, of which the turn is good as long as something far is in view.
+// ahead in its own axes. A guess, of which the turn is good as long as frames show anything.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +50,8 @@ class LostWay {
   std::optional<Eigen::Quaterniond> TurnTo(const FrameView& view, const Eigen::Quaterniond& expected) const;
 
   const LostWayOptions options_;
-  Frame last_;
+  Frame anchor_;  // that the next one is compared with: the newest that had turned
+  Eigen::Quaterniond world_from_anchor_ = Eigen::Quaterniond::Identity();
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();
   std::vector<PoseAtTime> poses_;  // the newest ones

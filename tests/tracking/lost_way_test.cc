@@ -75,6 +75,22 @@ TEST_F(LostWayTest, TurnsOnForAWhileIfItSeesNothing) {
   EXPECT_LT(yaw_rad, 0.25);
 }
 
+// Without a way, frames tell nothing of where things are; and of one that stands, nothing moves.
+TEST_F(LostWayTest, TurnsOnTheSpotAndStands) {
+  way_.Begin(Take(0, {}), {}, Eigen::Vector3d::Zero(), {0.0, 0.3, 0.0});
+  for (int i = 1; i <= 12; ++i) way_.Add(Take(i, Turned(0.03 * std::min(i, 6))));
+  EXPECT_LT(way_.PoseAt(1'600'000).rotation.angularDistance(Turned(0.18).rotation), 0.01);
+  EXPECT_LT(way_.PoseAt(2'200'000).rotation.angularDistance(Turned(0.18).rotation), 0.01);
+  EXPECT_LT(way_.PoseAt(2'200'000).translation.norm(), 1e-9);
+}
+
+// By less than a pixel from frame to frame.
+TEST_F(LostWayTest, TurnsSlowly) {
+  way_.Begin(Take(0, {}), {}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  for (int i = 1; i <= 60; ++i) way_.Add(Take(i, Turned(0.0012 * i)));
+  EXPECT_LT(way_.PoseAt(7'000'000).rotation.angularDistance(Turned(0.072).rotation), 0.015);
+}
+
 TEST_F(LostWayTest, AFrameOfTheSameTimeChangesNothing) {
   way_.Begin(Take(0, {}), {}, {0.0, 0.0, 5.0}, {0.0, 0.2, 0.0});
   way_.Add(Take(0, Turned(0.1)));
