@@ -11,6 +11,8 @@ namespace {
 constexpr size_t kMaxPoses = 200;      // remembered: more than the start of a part looks back
 constexpr double kTurnMemory_s = 1.0;  // for so long a camera turns on as it did, unseen
 constexpr double kMaxFar_px = 2.0;     // of a keypoint that moved by the turn alone
+// From frame to frame a camera turns about alike: what a few false pairs say, in the worst case, doesn't.
+constexpr double kMaxChange_rad = 0.1, kMaxChangeShare = 0.5;
 
 // How many pairs moved as what is far away does. `turn`: second_from_first.
 size_t NumFar(const CameraCalibration& camera, const std::vector<PixelPair>& pairs, const Eigen::Quaterniond& turn) {
@@ -87,7 +89,9 @@ std::optional<Eigen::Quaterniond> LostWay::TurnTo(const FrameView& view, const E
   if (!motion) return std::nullopt;
   const Eigen::Quaterniond& turn = motion->second_from_first.rotation;
   const bool is_seen = motion->num_points >= two_view.min_points || 2 * NumFar(camera, pairs, turn) > pairs.size();
-  return is_seen ? std::optional(turn.conjugate()) : std::nullopt;
+  const double change_rad = turn.angularDistance(expected.conjugate());
+  const double max_change_rad = kMaxChange_rad + kMaxChangeShare * LogSO3(expected).norm();
+  return is_seen && change_rad < max_change_rad ? std::optional(turn.conjugate()) : std::nullopt;
 }
 
 }  // namespace tessera
