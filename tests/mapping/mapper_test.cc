@@ -209,10 +209,8 @@ TEST(Mapper, MendsTheScaleBeforeTheKeyframeComesInUnlessALoopHasSetIt) {
       LoopResult loop{.answers = {7}, .matched = {0}, .corrections = {}, .seen = {}};
       (void)mapper.Process(drive.Next(8), {.loops = {loop}, .adjustment = {}});
     }
-    const auto length = [&](int64_t from, int64_t to) {
-      return CenterError(mapper.map().FindKeyframe({from})->world_from_camera,
-                         mapper.map().FindKeyframe({to})->world_from_camera);
-    };
+    const auto place = [&](int64_t k) { return mapper.removed_keyframes().Find(mapper.map(), {k}).value().Pose(); };
+    const auto length = [&](int64_t from, int64_t to) { return CenterError(place(from), place(to)); };
     const double before = length(4, 7), sound = length(0, 3);
     KeyframeObservation seen = drive.Next(has_loop ? 9 : 8);
     seen.mendings = {{{4}, std::log(2.0)}};
