@@ -36,8 +36,9 @@ void CloseLoop(const LoopResult& loop, const LoopFusionOptions& options, MapEdit
 // What mends the scale of the part of the map that `keyframe` belongs to: `mendings` by keyframe. What came before the
 // first of them stays. In the order of ids, which is that of the camera's way,
 //
-//   new_world_from_k = new_world_from_(k-1) [(k-1)_from_k, its translation times the factor at k-1],  scaled by that at
-//   k
+//   new_world_from_k = new_world_from_(k-1) [(k-1)_from_k, its translation times the factor at k-1]
+//
+// and keyframe k with what it sees is scaled by the factor at k.
 Corrections ScaleCorrections(const Map& map, KeyframeId keyframe, const std::vector<ScaleMending>& mendings);
 
 // The map's poses and positions at the moment when a global adjustment was requested.

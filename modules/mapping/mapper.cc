@@ -182,8 +182,9 @@ bool Mapper::RefineLens(const KeyframeObservation& seen, MapEditor& editor) {
 
 // Where a loop was closed since the scale slipped, it has set the scale.
 bool Mapper::MendScale(const KeyframeObservation& seen, MapEditor& editor) {
+  if (seen.mendings.empty()) return false;
   const KeyframeId reference = removed_.Successor(map_, seen.reference);
-  if (seen.mendings.empty() || !reference.valid()) return false;
+  if (!reference.valid()) return false;
   for (const ClosedLoop& loop : map_.closed_loops()) {
     if (loop.current >= seen.mendings.front().keyframe) return false;
   }

@@ -19,7 +19,6 @@ constexpr double kMinDirectionVariance = 1e-5;
 constexpr double kMaxSpeedSigma = 0.15;  // of the logarithm of a speed that says something of the height
 constexpr size_t kNumHeights = 100;      // remembered
 constexpr size_t kMinHeights = 60;       // to know it
-constexpr double kNear = 0.25;           // in the logarithm: about the same height
 constexpr double kMinShareNear = 0.75;
 constexpr size_t kNumLatest = 20;
 constexpr double kSettled = 0.15;  // in the logarithm: heights that stay about as they are
@@ -32,7 +31,7 @@ constexpr double kMinMending = 0.1;  // of the logarithm: less is what roads do 
 
 double ShareNear(const std::vector<double>& log_heights, double log_height) {
   const auto num_near =
-      std::ranges::count_if(log_heights, [&](double height) { return std::abs(height - log_height) < kNear; });
+      std::ranges::count_if(log_heights, [&](double height) { return std::abs(height - log_height) < kNearHeight; });
   return static_cast<double>(num_near) / static_cast<double>(log_heights.size());
 }
 
@@ -176,7 +175,7 @@ void GroundWatch::LearnHeight(double log_height) {
     estimate_.reset();  // it was as good as can be
   }
   if (log_height_) {
-    const bool is_near = std::abs(log_height - *log_height_) < kNear;
+    const bool is_near = std::abs(log_height - *log_height_) < kNearHeight;
     num_elsewhere_ = is_near ? 0 : num_elsewhere_ + 1;
     if (is_near) *log_height_ += (log_height - *log_height_) / ++num_in_height_;
     if (num_elsewhere_ >= static_cast<int>(kNumHeights)) log_height_.reset();

@@ -77,13 +77,13 @@ std::optional<Eigen::Quaterniond> LostWay::TurnTo(const FrameView& view, const E
        MatchInWindow(*anchor_, centers_px, view, options_.radius_share * camera.width_px, options_.matching)) {
     pairs.push_back({anchor_->pixel(match.first), view.pixel(match.second)});
   }
+  if (2 * NumFar(camera, pairs, Eigen::Quaterniond::Identity()) > pairs.size()) return Eigen::Quaterniond::Identity();
   TwoViewOptions two_view = options_.two_view;
   std::vector<Rigid3> guesses;
   if (speed() > 0.0) {
     two_view.prior = DirectionPrior{velocity_, options_.direction_sigma_rad};
     guesses.push_back({expected.conjugate(), two_view.prior->DirectionFor(expected.conjugate())});
   }
-  if (2 * NumFar(camera, pairs, Eigen::Quaterniond::Identity()) > pairs.size()) return Eigen::Quaterniond::Identity();
   const auto seed = static_cast<uint64_t>(view.features().frame.value);
   const std::optional<TwoViewResult> motion = EstimateTwoView(camera, pairs, seed, two_view, guesses);
   if (!motion) return std::nullopt;

@@ -8,9 +8,8 @@
 namespace tessera {
 namespace {
 
-constexpr double kNear = 0.25;  // in the logarithm: about the same height
-constexpr int kNumInARow = 5;   // such steps
-constexpr size_t kAround = 5;   // steps before and after one, of whose logarithms the median is taken
+constexpr int kNumInARow = 5;  // such steps
+constexpr size_t kAround = 5;  // steps before and after one, of whose logarithms the median is taken
 
 // Of every step: told by the ground, or in between on a straight line from the last that is to the next one.
 std::vector<double> GroundSpeeds(const std::vector<GroundStep>& steps) {
@@ -41,7 +40,7 @@ size_t NumSound(const std::vector<GroundStep>& steps, double log_height) {
   for (size_t i = steps.size(); i-- > 0 && num_in_a_row < kNumInARow;) {
     if (!steps[i].log_ground_speed) continue;
     const double difference = steps[i].log_map_speed - *steps[i].log_ground_speed - log_height;
-    num_in_a_row = std::abs(difference) < kNear ? num_in_a_row + 1 : 0;
+    num_in_a_row = std::abs(difference) < kNearHeight ? num_in_a_row + 1 : 0;
     if (num_in_a_row == 1) num_sound = i + 1;
   }
   return num_in_a_row > 0 ? num_sound : 0;

@@ -16,6 +16,8 @@
 
 namespace tessera {
 
+inline constexpr double kNearHeight = 0.25;  // in the logarithm: about the same height
+
 // From one frame to the next.
 struct GroundStep {
   KeyframeId reference;                      // from which the frames were tracked

@@ -257,8 +257,9 @@ def mending_warnings(evaluated: dict[str, Any]) -> list[str]:
     if times == 0:
         return []
     return [
-        f"The scale slipped, as the ground below the camera shows, and was mended {_times(times)}: keyframes and "
-        "trajectory.txt are right again to a tenth or two, what was estimated live before is not."
+        f"The scale slipped, or was a guess after a loss, and was mended {_times(times)} by what the ground below the "
+        "camera shows: keyframes and trajectory.txt have that scale now, which may be off by some tenths; poses that "
+        "were told live before keep theirs."
     ]
 
 
