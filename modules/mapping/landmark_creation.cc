@@ -8,6 +8,8 @@
 namespace tessera {
 namespace {
 
+constexpr double kMinBaselineShare = 1e-4;  // of the least depth: nearer views are the same one
+
 LandmarkId AddLandmark(const Eigen::Vector3d& position_in_world, std::initializer_list<Observation> observations,
                        MapEditor& editor) {
   const LandmarkId id = editor.AddLandmark({.position_in_world = position_in_world});
@@ -30,6 +32,34 @@ void CreateFromPair(KeyframeId id, KeyframeId other_id, const EpipolarSearch& se
     const Eigen::Vector3d position = keyframe.world_from_camera * match->point_in_first;
     created.push_back(AddLandmark(position, {{id, i}, {other_id, match->keypoint}}, editor));
   }
+}
+
+// Keyframes that share landmarks with this one, most of them first.
+struct Neighbors {
+  std::vector<KeyframeId> telling;  // far enough away to tell depths
+  std::vector<KeyframeId> near;     // mono: the others
+};
+
+Neighbors FindNeighbors(const Map& map, KeyframeId id, double min_depth, double median_depth,
+                        const CreationOptions& options) {
+  const Keyframe& keyframe = *map.FindKeyframe(id);
+  const double camera_baseline_m = Baseline(keyframe.features->calibration);
+  const double telling = camera_baseline_m > 0.0 ? camera_baseline_m : options.min_baseline_share * median_depth;
+  Neighbors neighbors;
+  for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
+    const Keyframe& other = *map.FindKeyframe(other_id);
+    const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
+    if (baseline >= telling) {
+      neighbors.telling.push_back(other_id);
+    } else if (camera_baseline_m == 0.0 && baseline > kMinBaselineShare * min_depth) {
+      neighbors.near.push_back(other_id);
+    }
+  }
+  return neighbors;
+}
+
+int NumLandmarks(const Keyframe& keyframe) {
+  return static_cast<int>(std::ranges::count_if(keyframe.landmarks, &LandmarkId::valid));
 }
 
 }  // namespace
@@ -58,19 +88,17 @@ std::vector<LandmarkId> CreateFromPairs(KeyframeId id, const CreationOptions& op
   std::vector<LandmarkId> created;
   if (depths.empty()) return created;
   const double min_depth = depths[depths.size() / 20] / 3.0, median_depth = depths[depths.size() / 2];
-  const double camera_baseline_m = Baseline(keyframe.features->calibration);
-  const double min_baseline = camera_baseline_m > 0.0 ? camera_baseline_m : options.min_baseline_share * median_depth;
-
-  for (const KeyframeId other_id : map.Covisible(id, options.max_neighbors)) {
+  const auto search_in = [&](KeyframeId other_id) {
     const Keyframe& other = *map.FindKeyframe(other_id);
-    const double baseline = (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
-    if (baseline < min_baseline) continue;
     const Rigid3 other_from_keyframe = other.world_from_camera.Inverse() * keyframe.world_from_camera;
     const auto is_free = [&other](int32_t keypoint) { return !other.landmarks[Index(keypoint)].valid(); };
     const EpipolarSearch search(*keyframe.features, *other.features, other_from_keyframe, is_free, min_depth,
                                 options.matching);
     CreateFromPair(id, other_id, search, created, editor);
-  }
+  };
+  const Neighbors neighbors = FindNeighbors(map, id, min_depth, median_depth, options);
+  std::ranges::for_each(neighbors.telling, search_in);
+  if (NumLandmarks(keyframe) < options.few_landmarks) std::ranges::for_each(neighbors.near, search_in);
   return created;
 }
 

@@ -13,7 +13,10 @@ namespace tessera {
 struct CreationOptions {
   int max_neighbors = 10;  // keyframes searched for a second view, most shared landmarks first
   EpipolarOptions matching;
-  double min_baseline_share = 0.01;  // mono: a neighbor must be this part of the median depth away
+  double min_baseline_share = 0.01;  // mono: a neighbor must be this part of the median depth away to tell depths
+  // Mono: a keyframe that still sees fewer landmarks is searched for in nearer neighbors, too. Where only far things
+  // are in view, hardly any neighbor is far enough away, and what shows no depth holds the rotation all the same.
+  int few_landmarks = 250;
   DepthPointOptions depth;
 
   // Fails if a value is out of range.

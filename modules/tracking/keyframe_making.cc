@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kOpenShare = 0.01;    // of a way from keyframe to keyframe
 constexpr int kMaxSharedAtPair = 100;  // with fewer known points, a wide pair's points go to the mapper as well
+constexpr int kMinKnownPoints = 60;    // a frame that sees fewer while the way is open is about to lose sight of all
 
 // Whether the images leave the length of the way from the reference keyframe open by more than kOpenShare of it.
 bool IsWayOpen(const LocalizedFrame& localized) {
@@ -68,13 +69,16 @@ void AddDepthPoints(KeyframeId id, const DepthPointOptions& options, TrackedFram
   }
 }
 
-void AddPairPoints(const ReferenceKeyframe& reference, const MapReplica& replica, TrackedFrame& frame,
+void AddPairPoints(const ReferenceKeyframe& reference, const MapReplica& replica, LocalizedFrame& localized,
                    KeyframeObservation& keyframe, SentKeyframe& sent) {
-  if (frame.view->baseline_m() > 0.0 || !reference.frame) return;
+  TrackedFrame& frame = localized.frame;
+  const int num_known = frame.NumPoints();
+  const bool fades = keyframe.expected.is_known() && num_known < kMinKnownPoints;
+  if (frame.view->baseline_m() > 0.0 || !reference.frame || !(localized.is_wide_step || fades)) return;
   const Sim3 world_from_reference = reference.WorldFromKeyframe(replica);
   TrackedFrame other = *reference.frame;
   other.world_from_camera = world_from_reference.Pose();
-  const bool shares = frame.NumPoints() < kMaxSharedAtPair;
+  const bool shares = localized.is_wide_step && num_known < kMaxSharedAtPair;
   const Sim3 units = Sim3::From({}, 1.0 / world_from_reference.scale);
   for (const PairPoint& point : FindPairPoints(frame, other)) {
     const Landmark in_world = InWorld(Sim3::From(frame.world_from_camera), point.in_camera);

@@ -403,7 +403,7 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
   const bool has_known_points = frame.NumPoints() > 0;
   if (has_known_points) decision_.Restart(frame);
   AddDepthPoints(id, options_.depth, frame, sent);
-  if (localized.is_wide_step) AddPairPoints(reference_, replica_, frame, keyframe, sent);
+  AddPairPoints(reference_, replica_, localized, keyframe, sent);
   if (!has_known_points) decision_.Restart(frame);
   replica_.Send(id, std::move(sent));
   if (begins_part) {

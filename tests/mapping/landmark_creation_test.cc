@@ -9,6 +9,7 @@
 
 #include "map/map_editor.h"
 #include "measurement/keypoint_measurement.h"
+#include "measurement/landmark_view.h"
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 
@@ -47,6 +48,11 @@ class PartlyKnownMap {
     return planted_.Truth({0}).rotation.angularDistance(planted_.Truth({map().keyframes().end_id() - 1}).rotation);
   }
   const Eigen::Vector3d& Position(LandmarkId id) const { return map().FindLandmark(id)->position_in_world; }
+  // From the last keyframe to `other`, by the median depth.
+  double BaselineShare(KeyframeId other) const {
+    const std::vector<double> depths = LandmarkDepths(map(), *map().FindKeyframe({map().keyframes().end_id() - 1}));
+    return (planted_.Truth(other).translation - Center()).norm() / depths[depths.size() / 2];
+  }
   // Of the last keyframe, whose rays the landmarks stand on.
   Eigen::Vector3d Center() const {
     return map().FindKeyframe({map().keyframes().end_id() - 1})->world_from_camera.translation;
@@ -138,6 +144,32 @@ TEST(CreateFromPairs, ATurnBetweenTheViewsCountsAsNoise) {
 TEST(CreateFromPairs, KeyframesAtTheSamePositionAreNotSearched) {
   PartlyKnownMap world(SensorType::kMono, {3, 3});
   EXPECT_TRUE(world.Run(CreateFromPairs).empty());
+}
+
+// Where all that is seen is far, every neighbor is near.
+TEST(CreateFromPairs, NeighborsTooNearToTellDepthsAreSearchedWhereLandmarksAreFew) {
+  const auto num_created = [](double min_baseline_share, int few_landmarks) {
+    PartlyKnownMap world(SensorType::kMono, {0, 3});
+    const CreationOptions options{.min_baseline_share = min_baseline_share, .few_landmarks = few_landmarks};
+    return world.Run(CreateFromPairs, options).size();
+  };
+  constexpr double kAllAreNear = 1e3;
+  EXPECT_EQ(num_created(kAllAreNear, 0), 0U);
+  EXPECT_EQ(num_created(kAllAreNear, 10000), num_created(0.01, 0));
+}
+
+TEST(CreateFromPairs, NeighborsThatTellDepthsComeFirst) {
+  constexpr KeyframeId kFar{0}, kNear{1};
+  const auto num_with = [](KeyframeId other, double min_baseline_share) {
+    PartlyKnownMap world(SensorType::kMono, {0, 5, 6});
+    const CreationOptions options{.min_baseline_share = min_baseline_share, .few_landmarks = 10000};
+    const std::vector<LandmarkId> created = world.Run(CreateFromPairs, options);
+    return std::ranges::count_if(created, [&](LandmarkId id) { return world.map().IsSeenBy(id, other); });
+  };
+  EXPECT_GT(num_with(kNear, 1e-3), num_with(kFar, 1e-3)) << "both tell; the near one shares more";
+  const double between = 3.0 * PartlyKnownMap(SensorType::kMono, {0, 5, 6}).BaselineShare(kNear);
+  EXPECT_GT(num_with(kFar, between), num_with(kFar, 1e-3));
+  EXPECT_GT(num_with(kNear, between), 0) << "what only that one sees";
 }
 
 TEST(CreateFromPairs, OnlyTheBestNeighborsAreSearched) {

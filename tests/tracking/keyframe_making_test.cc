@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 #include "tracking/localized_frame.h"
@@ -81,20 +83,51 @@ TEST_P(KeyframeMaking, KeypointsWithDepthArePointsUntilTheMapperAnswers) {
   }
 }
 
-TEST_P(KeyframeMaking, AWidePairOfMonoHasPointsOfItsOwn) {
-  LocalizedFrame other = At(0), localized = At(2);
-  const ReferenceKeyframe reference{.id = KeyframeId{3}, .frame = other.frame};
-  replica_.Send(reference.id, {{}, other.frame.world_from_camera, {}});
-  for (SeenPoint& point : localized.frame.points) point = {};
-  KeyframeObservation keyframe = Observe(localized);
-  SentKeyframe sent{reference.id, localized.reference_from_camera, {}};
-  ReferenceKeyframe blind = reference;
-  for (SeenPoint& point : blind.frame->points) point = {};
-  AddPairPoints(blind, replica_, localized.frame, keyframe, sent);
+// A keyframe at step 2 of which `num_known` points are left, and its reference at step 0, which knows none.
+class Pair : public KeyframeMaking {
+ protected:
+  void Make(size_t num_known, bool is_wide_step, bool is_way_open) {
+    LocalizedFrame other = At(0);
+    for (SeenPoint& point : other.frame.points) point = {};
+    localized_.emplace(At(2));
+    localized_->is_wide_step = is_wide_step;
+    for (size_t i = num_known; i < localized_->frame.points.size(); ++i) localized_->frame.points[i] = {};
+    const ReferenceKeyframe reference{.id = KeyframeId{3}, .frame = other.frame};
+    replica_.Send(reference.id, {{}, other.frame.world_from_camera, {}});
+    keyframe_ = Observe(*localized_);
+    keyframe_.expected = {};
+    if (is_way_open) keyframe_.expected.information = Eigen::Matrix3d::Identity();
+    ASSERT_EQ(keyframe_.expected.is_known(), is_way_open);
+    AddPairPoints(reference, replica_, *localized_, keyframe_, sent_);
+  }
+
+  std::optional<LocalizedFrame> localized_;
+  KeyframeObservation keyframe_;
+  SentKeyframe sent_{KeyframeId{3}, {}, {}};
+};
+
+INSTANTIATE_TEST_SUITE_P(Sensors, Pair, testing::Values(SensorType::kMono, SensorType::kStereo));
+
+TEST_P(Pair, AWideOneOfMonoHasPointsOfItsOwn) {
+  Make(0, true, false);
   const bool is_mono = GetParam() == SensorType::kMono;
-  EXPECT_EQ(sent.points.size() > 100, is_mono);
-  EXPECT_EQ(keyframe.shared.size(), sent.points.size()) << "no known point is left in view: the mapper gets them too";
-  EXPECT_EQ(localized.frame.NumPoints(), static_cast<int>(sent.points.size()));
+  EXPECT_EQ(sent_.points.size() > 100, is_mono);
+  EXPECT_EQ(keyframe_.shared.size(), sent_.points.size()) << "no known point is left in view: the mapper gets them too";
+  EXPECT_EQ(localized_->frame.NumPoints(), static_cast<int>(sent_.points.size()));
+}
+
+TEST_P(Pair, WherePointsFadeTheMapperGetsThemOnceAThirdViewHasSeenThem) {
+  Make(30, false, true);
+  EXPECT_EQ(sent_.points.size() > 100, GetParam() == SensorType::kMono);
+  EXPECT_EQ(localized_->frame.NumPoints(), static_cast<int>(30 + sent_.points.size()));
+  EXPECT_TRUE(keyframe_.shared.empty());
+}
+
+TEST_P(Pair, ANarrowOneHasNoneWhileManyPointsAreKnownOrImagesFixTheWay) {
+  Make(100, false, true);
+  EXPECT_TRUE(sent_.points.empty());
+  Make(30, false, false);
+  EXPECT_TRUE(sent_.points.empty());
 }
 
 }  // namespace
