@@ -21,8 +21,10 @@ namespace {
 // window too far gave up to 0.66 and 0.37.
 constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
 // Or if the motion so far knew, to this standard deviation, where points are seen, and the camera turned as predicted.
-// In the open, where points fade from frame to frame, no other try is better.
+// In the open, where points fade from frame to frame, no other try is better. The motion of a vehicle, whose direction
+// is known well, may know less of it: where it is out by so much, a wall is not seen one window too far.
 constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
+constexpr double kMaxDirectionSigma_rad = 0.1, kMaxVehicleSigma_px = 5.0;
 
 // With depth, two frames by themselves are asked only where fewer points agree: that takes ten times as long as all the
 // tries, and more points are hardly wrong by chance.
@@ -82,8 +84,10 @@ bool FrameSearch::PairContradicts(const Rigid3& world_from_camera) {
 
 // Whether the motion so far knew where the last frame's points are seen, and the camera turned as predicted.
 bool FrameSearch::IsAsExpected(const Rigid3& world_from_camera) const {
-  return expected_.prior && TurnBetween(expected_.world_from_camera, world_from_camera) < kMaxTurnFromPrediction_rad &&
-         ExpectedSigma_px() < kMaxPriorSigma_px;
+  if (!expected_.prior) return false;
+  const bool is_vehicle = expected_.way && expected_.way->sigma_rad < kMaxDirectionSigma_rad;
+  return TurnBetween(expected_.world_from_camera, world_from_camera) < kMaxTurnFromPrediction_rad &&
+         ExpectedSigma_px() < (is_vehicle ? kMaxVehicleSigma_px : kMaxPriorSigma_px);
 }
 
 // Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.

@@ -1,5 +1,6 @@
 #include "tracking/keyframe_making.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "measurement/landmark_description.h"
@@ -8,9 +9,10 @@
 namespace tessera {
 namespace {
 
-constexpr double kOpenShare = 0.01;    // of a way from keyframe to keyframe
-constexpr int kMaxSharedAtPair = 100;  // with fewer known points, a wide pair's points go to the mapper as well
-constexpr int kMinKnownPoints = 60;    // a frame that sees fewer while the way is open is about to lose sight of all
+constexpr double kOpenShare = 0.01;      // of a way from keyframe to keyframe
+constexpr double kFamiliarShare = 0.15;  // of that way: an axis of what the motion doesn't know of it
+constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
+constexpr int kMinKnownPoints = 60;      // a frame that sees fewer on an open way is about to lose sight of all
 
 // Whether the images leave the length of the way from the reference keyframe open by more than kOpenShare of it.
 bool IsWayOpen(const LocalizedFrame& localized) {
@@ -19,6 +21,13 @@ bool IsWayOpen(const LocalizedFrame& localized) {
   const Eigen::Vector3d way_in_camera = way.rotation.conjugate() * way.translation;
   const double variance = way_in_camera.dot(*localized.covariance * way_in_camera);  // of the length, times length^2
   return std::sqrt(variance) > kOpenShare * way_in_camera.squaredNorm();
+}
+
+// Whether the images leave the way open, and how the camera moved a moment ago says well what it is.
+bool IsWayFamiliar(const KeyframeObservation& keyframe) {
+  if (!keyframe.expected.is_known()) return false;
+  const double variance = keyframe.expected.information.inverse().trace() / 3.0;
+  return std::sqrt(variance) < kFamiliarShare * keyframe.reference_from_camera.translation.norm();
 }
 
 }  // namespace
@@ -73,7 +82,7 @@ void AddPairPoints(const ReferenceKeyframe& reference, const MapReplica& replica
                    KeyframeObservation& keyframe, SentKeyframe& sent) {
   TrackedFrame& frame = localized.frame;
   const int num_known = frame.NumPoints();
-  const bool fades = keyframe.expected.is_known() && num_known < kMinKnownPoints;
+  const bool fades = num_known < kMinKnownPoints && IsWayFamiliar(keyframe);
   if (frame.view->baseline_m() > 0.0 || !reference.frame || !(localized.is_wide_step || fades)) return;
   const Sim3 world_from_reference = reference.WorldFromKeyframe(replica);
   TrackedFrame other = *reference.frame;

@@ -22,10 +22,12 @@ Landmark PointOf(const FrameView& view, int32_t keypoint, const Eigen::Vector3d&
 // Stereo, RGB-D: keypoints with depth that see no known point are points of their own, which the frame sees now.
 void AddDepthPoints(KeyframeId id, const DepthPointOptions& options, TrackedFrame& frame, SentKeyframe& sent);
 
-// Mono, after a wide step or where known points fade from view: what this keyframe and its reference see is known by
-// them, and the frame sees it now. At the next step it may be all that is left in view. After a wide step with few
-// known points, the mapper gets these as well; where points fade, slowly, it gets those that a third view confirms. To
-// be called before the keyframe becomes the reference.
+// Mono, after a wide step, or where known points fade from the view of a vehicle: what this keyframe and its reference
+// see is known by them, and the frame sees it now. At the next step it may be all that is left in view. After a wide
+// step with few known points, the mapper gets these as well; where points fade, it gets those that a third view
+// confirms. To be called before the keyframe becomes the reference.
+//
+// In a hand, a camera that sees next to nothing is better lost for some frames, and found again where much is known.
 void AddPairPoints(const ReferenceKeyframe& reference, const MapReplica& replica, LocalizedFrame& localized,
                    KeyframeObservation& keyframe, SentKeyframe& sent);
 

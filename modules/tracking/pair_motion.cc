@@ -48,7 +48,6 @@ TwoViewOptions WithPrior(const PairMotionOptions& options, const std::optional<D
   TwoViewOptions two_view = options.two_view;
   if (!expected) return two_view;
   two_view.max_direction_sigma_rad = options.max_direction_sigma_rad;
-  if (expected->sigma_rad <= options.min_expected_sigma_rad) two_view.min_points = options.min_points_as_expected;
   two_view.prior = {expected->way, std::max(options.min_expected_sigma_rad, expected->sigma_rad)};
   return two_view;
 }

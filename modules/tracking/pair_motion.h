@@ -22,11 +22,10 @@ struct PairMotionOptions {
   int min_known_points = 8;        // of known depth, which tells the length of the step
   double max_depth_spread = 0.25;  // half of them must agree on it within this share
   double min_cos_expected = 0.8;   // without them: between the step and the expected one
-  // Where the motion so far helps to tell turning from moving aside: how well the direction must be known then, how
-  // well it is at best, and how many points are enough if the motion knows it as well as that.
+  // Where the motion so far helps to tell turning from moving aside: how well the direction must be known then, and how
+  // well it is at best.
   double max_direction_sigma_rad = 0.15;
   double min_expected_sigma_rad = 0.1;
-  int min_points_as_expected = 20;
 
   Result<> Check() const;
 };

@@ -64,6 +64,19 @@ TEST_F(FrameSearchTest, BelievesASteadyMotionThatFewPointsAgreeWith) {
   EXPECT_FALSE(found->is_doubtful);
 }
 
+// Whose direction is known well, as that of a vehicle is.
+TEST_F(FrameSearchTest, BelievesTheMotionOfAVehicleThatKnowsLess) {
+  const double sigma_m = 0.005, turn_sigma_rad = 3.0 / world_.calibration().fx_px;
+  const PosePrior prior{truth_.Inverse(), Eigen::Matrix3d::Identity() / (sigma_m * sigma_m)};
+  for (const double direction_sigma_rad : {0.05, 0.2}) {
+    const DirectionPrior way{truth_.translation - last_.world_from_camera.translation, direction_sigma_rad};
+    const ExpectedFrame expected{truth_, way, prior, turn_sigma_rad};
+    const auto found = Follow(Faded(Take(), 6), expected);
+    ASSERT_TRUE(found.has_value());
+    EXPECT_EQ(found->is_doubtful, direction_sigma_rad > 0.1);
+  }
+}
+
 TEST_F(FrameSearchTest, DoesNotBelieveATurnThatIsNotSteady) {
   const double sigma_m = 0.005;
   const PosePrior prior{truth_.Inverse(), Eigen::Matrix3d::Identity() / (sigma_m * sigma_m)};

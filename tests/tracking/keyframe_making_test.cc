@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <optional>
+#include <utility>
 
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
@@ -86,7 +87,8 @@ TEST_P(KeyframeMaking, KeypointsWithDepthArePointsUntilTheMapperAnswers) {
 // A keyframe at step 2 of which `num_known` points are left, and its reference at step 0, which knows none.
 class Pair : public KeyframeMaking {
  protected:
-  void Make(size_t num_known, bool is_wide_step, bool is_way_open) {
+  // `way_sigma_share`: what the motion so far doesn't know of the way, by its length; 0: images fix the way.
+  void Make(size_t num_known, bool is_wide_step, double way_sigma_share) {
     LocalizedFrame other = At(0);
     for (SeenPoint& point : other.frame.points) point = {};
     localized_.emplace(At(2));
@@ -96,8 +98,10 @@ class Pair : public KeyframeMaking {
     replica_.Send(reference.id, {{}, other.frame.world_from_camera, {}});
     keyframe_ = Observe(*localized_);
     keyframe_.expected = {};
-    if (is_way_open) keyframe_.expected.information = Eigen::Matrix3d::Identity();
-    ASSERT_EQ(keyframe_.expected.is_known(), is_way_open);
+    if (way_sigma_share > 0.0) {
+      const double sigma = way_sigma_share * keyframe_.reference_from_camera.translation.norm();
+      keyframe_.expected.information = Eigen::Matrix3d::Identity() / (sigma * sigma);
+    }
     AddPairPoints(reference, replica_, *localized_, keyframe_, sent_);
   }
 
@@ -109,7 +113,7 @@ class Pair : public KeyframeMaking {
 INSTANTIATE_TEST_SUITE_P(Sensors, Pair, testing::Values(SensorType::kMono, SensorType::kStereo));
 
 TEST_P(Pair, AWideOneOfMonoHasPointsOfItsOwn) {
-  Make(0, true, false);
+  Make(0, true, 0.0);
   const bool is_mono = GetParam() == SensorType::kMono;
   EXPECT_EQ(sent_.points.size() > 100, is_mono);
   EXPECT_EQ(keyframe_.shared.size(), sent_.points.size()) << "no known point is left in view: the mapper gets them too";
@@ -117,17 +121,17 @@ TEST_P(Pair, AWideOneOfMonoHasPointsOfItsOwn) {
 }
 
 TEST_P(Pair, WherePointsFadeTheMapperGetsThemOnceAThirdViewHasSeenThem) {
-  Make(30, false, true);
+  Make(30, false, 0.1);
   EXPECT_EQ(sent_.points.size() > 100, GetParam() == SensorType::kMono);
   EXPECT_EQ(localized_->frame.NumPoints(), static_cast<int>(30 + sent_.points.size()));
   EXPECT_TRUE(keyframe_.shared.empty());
 }
 
-TEST_P(Pair, ANarrowOneHasNoneWhileManyPointsAreKnownOrImagesFixTheWay) {
-  Make(100, false, true);
-  EXPECT_TRUE(sent_.points.empty());
-  Make(30, false, false);
-  EXPECT_TRUE(sent_.points.empty());
+TEST_P(Pair, ANarrowOneHasNoneOtherwise) {
+  for (const auto& [num_known, way_sigma_share] : {std::pair<size_t, double>{100, 0.1}, {30, 0.0}, {30, 0.3}}) {
+    Make(num_known, false, way_sigma_share);
+    EXPECT_TRUE(sent_.points.empty()) << num_known << " known points, the way is open by " << way_sigma_share;
+  }
 }
 
 }  // namespace

@@ -52,26 +52,6 @@ TEST_F(PairMotion, IsUnknownIfItsLengthIsOrItGoesElsewhereThanExpected) {
   EXPECT_FALSE(EstimatePairMotion(unknown, *current_, DirectionPrior{{0.0, 0.0, -1.0}, 0.2}, {}).has_value());
 }
 
-TEST_F(PairMotion, FewPointsAreEnoughIfTheirDirectionIsKnown) {
-  const auto seen_by = [&](const FrameView& view) {
-    constexpr size_t kFew = 40;
-    FeatureFrame features = view.features();
-    features.keypoints.resize(kFew);
-    features.descriptors.resize(kFew);
-    return ViewOf(features);
-  };
-  TrackedFrame last(seen_by(*last_.view));
-  const auto current = seen_by(*current_);
-  const auto with_sigma = [&](double sigma_rad) {
-    return EstimatePairMotion(last, *current, DirectionPrior{{0.1, 0.0, 1.0}, sigma_rad}, {});
-  };
-  EXPECT_FALSE(with_sigma(0.2).has_value());
-  const auto motion = with_sigma(0.05);
-  ASSERT_TRUE(motion.has_value());
-  EXPECT_LT(motion->rotation.angularDistance(last_from_current_.rotation), 0.03);
-  EXPECT_GT(motion->translation.normalized().dot(last_from_current_.translation.normalized()), 0.97);
-}
-
 TEST(PairMotionOptions, AreChecked) {
   EXPECT_THAT(PairMotionOptions{}.Check(), IsSuccess());
   EXPECT_THAT(PairMotionOptions{.min_known_points = 0}.Check(), IsFailure(HasSubstr("known point")));
