@@ -14,8 +14,9 @@ struct CreationOptions {
   int max_neighbors = 10;  // keyframes searched for a second view, most shared landmarks first
   EpipolarOptions matching;
   double min_baseline_share = 0.01;  // mono: a neighbor must be this part of the median depth away to tell depths
-  // Mono: a keyframe that still sees fewer landmarks is searched for in nearer neighbors, too. Where only far things
-  // are in view, hardly any neighbor is far enough away, and what shows no depth holds the rotation all the same.
+  // Mono: with fewer landmarks than this after those neighbors, the nearer ones are searched for second views, too.
+  // Where only far things are in view, hardly any neighbor is far enough away, and points of unknown depth hold the
+  // rotation all the same.
   int few_landmarks = 250;
   DepthPointOptions depth;
 

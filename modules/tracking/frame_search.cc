@@ -21,8 +21,8 @@ namespace {
 // window too far gave up to 0.66 and 0.37.
 constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
 // Or if the motion so far knew, to this standard deviation, where points are seen, and the camera turned as predicted.
-// In the open, where points fade from frame to frame, no other try is better. The motion of a vehicle, whose direction
-// is known well, may know less of it: that doesn't change by a window of a wall from frame to frame.
+// In the open, where points fade from frame to frame, no other try is better. A vehicle, whose direction of travel is
+// known well, doesn't jump aside by a window of a wall: its motion need not know the image as well.
 constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
 constexpr double kMaxDirectionSigma_rad = 0.1, kMaxVehicleSigma_px = 5.0;
 

@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 constexpr double kOpenShare = 0.01;      // of a way from keyframe to keyframe
-constexpr double kFamiliarShare = 0.15;  // of that way: an axis of what the motion doesn't know of it
+constexpr double kFamiliarShare = 0.15;  // of that way: a standard deviation an axis, as vehicles' motions know it
 constexpr int kMaxSharedAtPair = 100;    // with fewer known points, a wide pair's points go to the mapper as well
 constexpr int kMinKnownPoints = 60;      // a frame that sees fewer on an open way is about to lose sight of all
 
