@@ -1,5 +1,6 @@
 #include "map/map_follower.h"
 
+#include <algorithm>
 #include <iterator>
 #include <utility>
 
@@ -44,6 +45,7 @@ void MapFollower::ReceiveRest(MapDelta whole) {
 void MapFollower::Complete() {
   snapshot_ = std::make_shared<const MapDelta>(std::move(collected_->whole));
   collected_.reset();
+  num_known_ = std::max(num_known_, next_delta_);  // what was given out exists, and no news may come to tell of it
   next_delta_ = snapshot_->number + 1;
   waiting_.erase(waiting_.begin(), waiting_.lower_bound(next_delta_));
   needs_snapshot_ = false;

@@ -298,6 +298,26 @@ TEST(MapFollower, AWrongHashIsFoundAndMendedByASnapshot) {
   ExpectEqual(replica, owner.map());
 }
 
+// Who finds late that a delta was wrong has dropped those behind it, and the owner may wait for that one itself.
+TEST(MapFollower, AfterAWrongHashWhatTheSnapshotLacksIsAskedForWithoutNews) {
+  Owner owner(5);
+  MapFollower follower;
+  std::vector<MapFollower::Delta> given;
+  for (int i = 0; i < 40; ++i) {
+    follower.Receive(owner.Next());
+    std::ranges::move(follower.Take(), std::back_inserter(given));
+  }
+  ASSERT_EQ(given.size(), 40U);
+  follower.Reject();
+  Map replica;
+  while (follower.Request()) {
+    owner.Answer(*follower.Request(), follower);
+    EXPECT_THAT(Update(follower, replica), IsSuccess());
+  }
+  ASSERT_GT(owner.num_pages(), 0);
+  ExpectEqual(replica, owner.map());
+}
+
 TEST(MapFollower, PagesForOthersAreNoBusinessOfOnesOwn) {
   Owner owner(6);
   MapFollower follower, late(true);
