@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "measurement/landmark_view.h"
+
 namespace tessera {
 
 int OptimizeFrame(const PoseOptimizationOptions& options, TrackedFrame& frame) {
@@ -16,10 +18,11 @@ PoseOptimizationResult PoseByPoints(const PoseOptimizationOptions& options, cons
   for (size_t i = 0; i < frame.points.size(); ++i) {
     if (!frame.points[i].valid()) continue;
     const Landmark& landmark = frame.points[i].landmark;
-    observations.push_back({.point_in_world = landmark.position_in_world,
-                            .depth_sigma_in_world = landmark.depth_sigma * landmark.normal,
-                            .seen = frame.view->observation(static_cast<int>(i)),
-                            .votes = votes.empty() || votes[observations.size()] != 0});
+    observations.push_back(
+        {.point_in_world = landmark.position_in_world,
+         .depth_sigma_in_world = landmark.depth_sigma * landmark.normal,
+         .seen = SeenAt(frame.view->features(), static_cast<int32_t>(i), landmark, frame.world_from_camera.translation),
+         .votes = votes.empty() || votes[observations.size()] != 0});
   }
   return OptimizePose(frame.view->calibration(), frame.view->baseline_m(), observations,
                       frame.world_from_camera.Inverse(), options, prior);

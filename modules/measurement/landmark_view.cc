@@ -63,6 +63,19 @@ std::optional<ExpectedView> Expect(const View& view, const Landmark& landmark) {
   return expected;
 }
 
+PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint, const Landmark& landmark,
+                        const Eigen::Vector3d& camera_in_world) {
+  PixelObservation seen = SeenAt(features, keypoint);
+  const double px_per_rad = AsideSigmaPxPerRad(features.calibration.sensor);
+  if (px_per_rad > 0.0) {
+    const Eigen::Vector3d to_camera = (camera_in_world - landmark.position_in_world).normalized();
+    const double aside_px = LevelScale(features.keypoints[static_cast<size_t>(keypoint)].level) * px_per_rad *
+                            (to_camera - landmark.normal).norm();
+    seen.sigma_px = std::hypot(seen.sigma_px, aside_px);
+  }
+  return seen;
+}
+
 uint8_t RollBetween(const Rigid3& second_from_first) {
   const Eigen::Matrix3d r = second_from_first.rotation.toRotationMatrix();
   const double roll_rad = std::atan2(r(1, 0) - r(0, 1), r(0, 0) + r(1, 1));

@@ -44,6 +44,14 @@ struct ExpectedView {
 // (with a fifth of tolerance), or is seen from more than 60 degrees aside of its normal.
 std::optional<ExpectedView> Expect(const View& view, const Landmark& landmark);
 
+// The keypoint as a measurement of the landmark from a camera that stands there. Seen from aside, a corner is not quite
+// where it was:
+//
+//   sigma(a)^2 = sigma^2 + (level_scale AsideSigmaPxPerRad a)^2      a: the angle between the line of sight and the
+//                                                                    landmark's mean one, as a chord
+PixelObservation SeenAt(const FeatureFrame& features, int32_t keypoint, const Landmark& landmark,
+                        const Eigen::Vector3d& camera_in_world);
+
 // By how much the image turns about the optical axis from one camera to another, in 1/256 turn.
 uint8_t RollBetween(const Rigid3& second_from_first);
 

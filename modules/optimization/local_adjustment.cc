@@ -42,7 +42,9 @@ void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size
     for (const Observation& observation : landmark.observations) {
       const int pose = pose_of[static_cast<size_t>(observation.keyframe.value)];
       if (pose < 0) continue;
-      problem.observations.push_back({pose, point, SeenAt(*features[Index(pose)], observation.keypoint)});
+      const Eigen::Vector3d& camera_in_world = map.FindKeyframe(observation.keyframe)->world_from_camera.translation;
+      problem.observations.push_back(
+          {pose, point, SeenAt(*features[Index(pose)], observation.keypoint, landmark, camera_in_world)});
     }
     if (problem.observations.size() - num_before < 2) {
       problem.observations.resize(num_before);

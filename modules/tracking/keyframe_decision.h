@@ -17,7 +17,7 @@ struct KeyframeDecisionOptions {
   // Of the reference's points that were found in the frame after it, this share must still be seen at the next frame.
   double min_share = 0.7;
   // The same where each keyframe has points of its own by their depth, and needs no second one that sees them.
-  double min_share_with_depth = 0.65;
+  double min_share_with_depth = 0.61;
   // Of all the reference's points, this share must be found in the frame after it. Corners come and go: a loss of a
   // third from frame to frame is nothing to act on, a greater one is motion.
   double min_first_share = 0.4;

@@ -8,6 +8,7 @@
 
 #include "geometry/pose_optimization.h"
 #include "geometry/reprojection.h"
+#include "measurement/landmark_view.h"
 
 namespace tessera {
 namespace {
@@ -75,9 +76,10 @@ std::optional<PoseInfluences> InfluencesOn(const TrackedFrame& frame) {
     if (!frame.points[i].valid()) continue;
     const Eigen::Vector3d point = camera_from_world * frame.points[i].landmark.position_in_world;
     if (point.z() < kMinDepth) continue;
-    const PixelObservation seen = frame.view->observation(static_cast<int>(i));
-    const Reprojection at = Reproject(camera, frame.view->baseline_m(), point, seen);
     const Landmark& landmark = frame.points[i].landmark;
+    const PixelObservation seen =
+        SeenAt(frame.view->features(), static_cast<int32_t>(i), landmark, frame.world_from_camera.translation);
+    const Reprojection at = Reproject(camera, frame.view->baseline_m(), point, seen);
     const Eigen::Vector3d by_depth = at.by_point * (rotation * (landmark.depth_sigma * landmark.normal));
     Term term;  // the point moves by  -translation + point x rotation
     term.by_pose << -at.by_point, at.by_point * Skew(point);

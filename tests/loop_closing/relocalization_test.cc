@@ -214,7 +214,9 @@ TEST(Relocalization, LocalizingOnlyMakesNoKeyframes) {
 TEST(Relocalization, ALoadedMapIsContinued) {
   KeyframeId last;
   const MapDelta made = MadeMap(&last);
-  Carried run;
+  MapTrackerOptions options;
+  options.keyframes.min_share_with_depth = 0.65;  // some more keyframes of a short way
+  Carried run(options);
   ASSERT_THAT(run.mapper.Load(made), IsSuccess());
   run.Apply(made);
   EXPECT_EQ(run.tracker.last_keyframe(), last);

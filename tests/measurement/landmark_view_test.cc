@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "support/matchers.h"
 
 namespace tessera {
@@ -71,6 +73,40 @@ TEST(Expect, NothingFromMoreThan60DegreesAside) {
   EXPECT_TRUE(from(55.0).has_value());
   EXPECT_FALSE(from(65.0).has_value());
   EXPECT_NEAR(from(30.0)->cos_angle, std::cos(M_PI / 6.0), 1e-9);
+}
+
+FeatureFrame OneKeypoint(SensorType sensor, int level) {
+  FeatureFrame features;
+  features.calibration = kCamera;
+  features.calibration.sensor = sensor;
+  features.keypoints = {Keypoint{.x_px = 320.0F, .y_px = 240.0F, .level = static_cast<uint8_t>(level)}};
+  return features;
+}
+
+double SigmaFrom(const Eigen::Vector3d& camera_in_world, const FeatureFrame& features) {
+  return SeenAt(features, 0, SeenFromOrigin({0.0, 0.0, 5.0}), camera_in_world).sigma_px;
+}
+
+TEST(SeenAt, ALandmarkFromWhereItWasSeenBeforeIsAsExactAsItsKeypoint) {
+  const FeatureFrame features = OneKeypoint(SensorType::kStereo, 3);
+  EXPECT_DOUBLE_EQ(SigmaFrom({0.0, 0.0, 2.0}, features), SeenAt(features, 0).sigma_px);
+}
+
+TEST(SeenAt, ALandmarkSeenFromAsideIsLessExactByItsAngleAndLevel) {
+  for (const int level : {0, 2}) {
+    const FeatureFrame features = OneKeypoint(SensorType::kStereo, level);
+    const Eigen::Vector3d aside(5.0 * std::sin(0.4), 0.0, 5.0 - 5.0 * std::cos(0.4));
+    const double chord = 2.0 * std::sin(0.2);
+    const double expected = LevelScale(level) * std::hypot(KeypointSigmaPx(SensorType::kStereo),
+                                                           AsideSigmaPxPerRad(SensorType::kStereo) * chord);
+    EXPECT_NEAR(SigmaFrom(aside, features), expected, 1e-12) << level;
+    EXPECT_GT(expected, 1.3 * SeenAt(features, 0).sigma_px);
+  }
+}
+
+TEST(SeenAt, MonoKeepsOneNoise) {
+  const FeatureFrame features = OneKeypoint(SensorType::kMono, 0);
+  EXPECT_DOUBLE_EQ(SigmaFrom({3.0, 0.0, 1.0}, features), SeenAt(features, 0).sigma_px);
 }
 
 TEST(RollBetween, IsTheTurnAboutTheOpticalAxis) {

@@ -277,8 +277,8 @@ TEST(MapTracker, AStepThatContradictsTheMotionIsDoubtfulIfItShowsInTheImage) {
 // One image shows the camera, which goes on steadily, behind or ahead of where it is: by what its points may err by all
 // together, or by what they can't.
 TEST(MapTracker, AStepThatPointsHardlyContradictGoesOnByTheMotion) {
-  for (const double step_length : {0.2, 1.2}) {
-    SyntheticWorld world(SensorType::kStereo, 0.3);
+  for (const double step_length : {0.1, 1.2}) {
+    SyntheticWorld world(SensorType::kStereo, 0.2);
     MapTracker tracker{MapTrackerOptions{}};
     Mapper mapper{MapperOptions{}};
     for (int64_t step = 0; step < 13; ++step) {
@@ -293,7 +293,7 @@ TEST(MapTracker, AStepThatPointsHardlyContradictGoesOnByTheMotion) {
         const Rigid3 pose = world.Pose(0.0).Inverse() * world.Pose(step_length * at);
         return (result.pose.world_from_camera.translation - pose.translation).norm();
       };
-      EXPECT_EQ(distance_to(12.0) < distance_to(11.5), step_length == 0.2) << step_length;
+      EXPECT_EQ(distance_to(12.0) < distance_to(11.5), step_length < 1.0) << step_length;
       EXPECT_LT(std::min(distance_to(11.5), distance_to(12.0)), 0.025);
     }
   }

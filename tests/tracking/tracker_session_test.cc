@@ -15,11 +15,17 @@ namespace {
 
 using State = TrackerSession::State;
 
+MapTrackerOptions Options() {
+  MapTrackerOptions options;
+  options.keyframes.min_share_with_depth = 0.65;  // some more keyframes of a short way
+  return options;
+}
+
 // A session with the mapper that answers it, whose deltas come only when they are delivered.
 class Stack {
  public:
   explicit Stack(std::unique_ptr<TrackerTime> time, bool begins_with_map = false)
-      : session(MapTrackerOptions{}, std::move(time), begins_with_map) {}
+      : session(Options(), std::move(time), begins_with_map) {}
 
   // Frame `step` of a drive comes, and all that can be tracked is. Returns the state after it.
   State Frame(int64_t step) { return Receive(world.Take(step).features); }
