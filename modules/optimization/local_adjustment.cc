@@ -30,10 +30,10 @@ void AddPoses(const Map& map, const LocalWindow& window, bool is_double, BundleP
 void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size_t num_observers,
                   BundleProblem& problem) {
   std::vector<int> pose_of(static_cast<size_t>(map.keyframes().end_id()), -1);  // by keyframe; -1: none of them
-  std::vector<const FeatureFrame*> features(num_observers);
+  std::vector<const Keyframe*> observers(num_observers);
   for (size_t i = 0; i < num_observers; ++i) {
     pose_of[static_cast<size_t>(problem.poses[i].id.value)] = static_cast<int>(i);
-    features[i] = map.FindKeyframe(problem.poses[i].id)->features.get();
+    observers[i] = map.FindKeyframe(problem.poses[i].id);
   }
   for (const LandmarkId id : landmarks) {
     const ObservedLandmark& landmark = *map.landmarks().Find(id);
@@ -42,9 +42,10 @@ void AddLandmarks(const Map& map, const std::vector<LandmarkId>& landmarks, size
     for (const Observation& observation : landmark.observations) {
       const int pose = pose_of[static_cast<size_t>(observation.keyframe.value)];
       if (pose < 0) continue;
-      const Eigen::Vector3d& camera_in_world = map.FindKeyframe(observation.keyframe)->world_from_camera.translation;
+      const Keyframe& observer = *observers[Index(pose)];
       problem.observations.push_back(
-          {pose, point, SeenAt(*features[Index(pose)], observation.keypoint, landmark, camera_in_world)});
+          {pose, point,
+           SeenAt(*observer.features, observation.keypoint, landmark, observer.world_from_camera.translation)});
     }
     if (problem.observations.size() - num_before < 2) {
       problem.observations.resize(num_before);

@@ -73,8 +73,8 @@ StepPose OptimizeStep(const MapReplica& replica, const PoseOptimizationOptions& 
   StepEvidence evidence = JudgeStep(*expected, by_images);
   // Mono's map is made of such steps: there it was no help.
   const bool has_depth = frame.view->baseline_m() > 0.0;
-  const bool goes_as_expected = JudgeStep(*expected, with_motion) != StepEvidence::kContradictory;
-  if (evidence == StepEvidence::kContradictory && !do_points_contradict && has_depth && goes_as_expected) {
+  const auto goes_as_expected = [&] { return JudgeStep(*expected, with_motion) != StepEvidence::kContradictory; };
+  if (evidence == StepEvidence::kContradictory && !do_points_contradict && has_depth && goes_as_expected()) {
     if (!by_all) by_all = Optimize(replica, options, nullptr, frame);
     if (FitsAsWell(with_motion.pose, by_all->pose)) evidence = StepEvidence::kWeak;
   }
