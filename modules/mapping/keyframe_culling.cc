@@ -90,13 +90,21 @@ void ObserverLevels::Forget(LandmarkId id) {
 KeyframeCuller::KeyframeCuller(const KeyframeCullingOptions& options) : options_(options) {}
 
 void KeyframeCuller::Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor) {
+  CullUpTo({center.value - options_.kept_newest}, center, removed, editor);
+}
+
+void KeyframeCuller::CullLast(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor) {
+  CullUpTo({center.value - 1}, center, removed, editor);
+}
+
+void KeyframeCuller::CullUpTo(KeyframeId last, KeyframeId center, RemovedKeyframes& removed, MapEditor& editor) {
   const Map& map = editor.map();
   visits_.Update(map, center);
   for (const LandmarkId id : editor.reobserved_landmarks().Ids()) Forget(id);
   const std::set<KeyframeId> closed_a_loop = KeyframesOfLoops(map);
   for (const KeyframeId id : map.Covisible(center, std::numeric_limits<int>::max())) {
     const bool must_stay = closed_a_loop.contains(id) || !map.FindKeyframe(id)->parent.valid();
-    if (must_stay || id.value > center.value - options_.kept_newest || !IsRedundant(map, id)) continue;
+    if (must_stay || id > last || !IsRedundant(map, id)) continue;
     Remove(id, removed, editor);
   }
 }

@@ -71,10 +71,13 @@ class KeyframeCuller {
   // that closed a loop. Since the last call, observations may have changed only by edits of `editor`; between the
   // calls, landmarks may have been removed as well.
   void Cull(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
+  // The same when no further keyframe comes: of the newest ones only `center` must stay.
+  void CullLast(KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
   // The same where Cull's changes are in the map already, with whatever else the step changed.
   void Follow(KeyframeId center, const Map& map);
 
  private:
+  void CullUpTo(KeyframeId last, KeyframeId center, RemovedKeyframes& removed, MapEditor& editor);
   bool IsRedundant(const Map& map, KeyframeId id);
   bool AreObserved(const Map& map, KeyframeId id, double share, int num_observers, int last_visit);
   void Forget(LandmarkId id);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "map/map_editor.h"
@@ -131,12 +132,20 @@ std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
   // Keyframes that came after the last adjustment was requested take part in another one.
   wants_adjustment_ |= last_asked_.valid() && last_asked_ < last;
   wants_adjustment_ |= options_.polishes && !is_polish_asked_;
-  if (!has_moved && !wants_adjustment_) return std::nullopt;
+  const bool has_culled = !std::exchange(is_culled_, true) && CullLast(last, editor);
+  if (!has_moved && !wants_adjustment_ && !has_culled) return std::nullopt;
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(last);
   delta.asks_adjustment = AskForAdjustment(last);
   is_polish_asked_ |= delta.asks_adjustment;
   return delta;
+}
+
+// Whether a keyframe went.
+bool Mapper::CullLast(KeyframeId last, MapEditor& editor) {
+  const size_t num_before = map_.keyframes().size();
+  keyframe_culler_.CullLast(last, removed_, editor);
+  return map_.keyframes().size() < num_before;
 }
 
 // Whether anything moved. Loops come first, since they change more; they outdate the adjustment.

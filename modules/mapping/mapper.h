@@ -65,8 +65,9 @@ class Mapper {
   // Takes a step that Process took in an earlier life, on the same input: without its work, and is the same mapper from
   // then on. `step`, which must be repeatable, is what LastStep said then. Fails, and can't go on, if it does not fit.
   Result<> Repeat(const KeyframeObservation& seen, const MapperStep& step);
-  // Applies the corrections that are due when no further keyframe will come, and asks for a last global adjustment
-  // after loops, or anyway to polish the map. nullopt if nothing changes: then the map is final.
+  // Applies the corrections that are due when no further keyframe will come, culls the newest keyframes where they are
+  // redundant, and asks for a last global adjustment after loops, or anyway to polish the map. nullopt if nothing
+  // changes: then the map is final.
   std::optional<MapDelta> Finish(const DueCorrections& due);
 
   const Map& map() const { return map_; }
@@ -79,6 +80,7 @@ class Mapper {
   const RemovedKeyframes& removed_keyframes() const { return removed_; }
 
  private:
+  bool CullLast(KeyframeId last, MapEditor& editor);
   bool ApplyDue(const DueCorrections& due, KeyframeId now, MapEditor& editor);
   bool ApplyDueLoops(const std::vector<LoopResult>& loops, KeyframeId now, MapEditor& editor);
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
@@ -110,6 +112,7 @@ class Mapper {
   std::optional<AdjustmentBase> base_;  // of the adjustment under way
   KeyframeId last_asked_;               // the last delta that requested an adjustment answers it
   bool is_base_outdated_ = false;       // a loop was closed since: the adjustment is ignored
+  bool is_culled_ = false;              // by Finish()
   bool is_polish_asked_ = false;
   int64_t num_void_loops_ = 0;
   int64_t num_scale_mendings_ = 0;

@@ -30,7 +30,7 @@ MapperSession::State MapperSession::state() const {
     return is_ready ? State::kReady : State::kAwaitsCorrections;
   }
   if (!tracker_end_ || num_processed_ < tracker_end_->num_values) return State::kAwaitsKeyframe;
-  return !has_corrections() || schedule_.CanFinish(last_loop()) ? State::kEnding : State::kAwaitsCorrections;
+  return !may_change() || schedule_.CanFinish(last_loop()) ? State::kEnding : State::kAwaitsCorrections;
 }
 
 Result<MapperActions> MapperSession::Load(const MapDelta& snapshot) {
@@ -113,9 +113,10 @@ MapperActions MapperSession::Process(const std::optional<MapperStep>& taken) {
   return actions;
 }
 
-// What is left of loops and adjustments corrects the map, which may ask for a last adjustment; then it is final.
+// What is left of loops and adjustments corrects the map, which may lose keyframes and ask for a last adjustment; then
+// it is final.
 MapperActions MapperSession::End() {
-  if (has_corrections()) {
+  if (may_change()) {
     std::optional<MapDelta> delta = mapper_.Finish(schedule_.TakeAll(last_loop()));
     if (delta) return Publish(std::move(*delta));
   }

@@ -75,8 +75,8 @@ class MapperSession {
  private:
   // The last keyframe that gets a loop result; invalid: there are none.
   KeyframeId last_loop() const { return options_.closes_loops ? KeyframeId{next_keyframe_.value - 1} : KeyframeId{}; }
-  // Whether corrections may still change the map when the last keyframe is in it.
-  bool has_corrections() const { return (options_.closes_loops || options_.mapper.polishes) && num_processed_ > 0; }
+  // Whether the map may still change when the last keyframe is in it.
+  bool may_change() const { return num_processed_ > 0; }
   MapperActions Process(const std::optional<MapperStep>& taken);
   MapperActions End();
   MapperActions Publish(MapDelta delta);

@@ -60,6 +60,14 @@ TEST_F(KeyframeCulling, RedundantKeyframesGoButForTheRootAndTheNewest) {
   EXPECT_EQ(Left(), (std::vector<int64_t>{0, 7, 8, 9}));
 }
 
+TEST_F(KeyframeCulling, AtTheEndTheNewestGoToo) {
+  Plant();
+  MapEditor editor(planted_.map());
+  KeyframeCuller({.kept_newest = 3}).CullLast({kNum - 1}, removed_, editor);
+  (void)editor.Finish({kNum - 1});
+  EXPECT_EQ(Left(), (std::vector<int64_t>{0, 8, 9})) << "each landmark keeps three observers";
+}
+
 // It remembers from call to call who observes what.
 TEST_F(KeyframeCulling, ChangesSinceTheLastCallCount) {
   Plant();
