@@ -58,6 +58,9 @@ Result<> MapperOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(fusion.Check());
   TESSERA_RETURN_IF_FAILED(window.Check());
   TESSERA_RETURN_IF_FAILED(bundle.Check());
+  if (max_iterations_with_depth < 1 || max_outer_keyframes_with_depth < 1) {
+    return Failed("with depth, too, the window needs an iteration and a pose that holds it");
+  }
   TESSERA_RETURN_IF_FAILED(landmark_culling.Check());
   if (num_cautious_keyframes < 0)
     return Failed("the number of keyframes that are mapped with caution can't be negative");
@@ -82,7 +85,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   const std::vector<LandmarkId> from_pairs = CreateLandmarks(seen.id, editor);
   FuseLandmarks(seen.id, options_.fusion, editor);
   if (IsCautious(seen.id)) RemoveUnconfirmed(seen.id, from_pairs, options_.landmark_culling, editor);
-  AdjustLocally(seen.id, Window(seen.id), options_.bundle, motions_, editor);
+  AdjustAround(seen, editor);
   keyframe_culler_.Cull(seen.id, removed_, editor);
   RefreshDescriptions(editor);
   MapDelta delta = editor.Finish(seen.id);
@@ -245,6 +248,16 @@ LocalWindowOptions Mapper::Window(KeyframeId now) const {
   LocalWindowOptions window = options_.window;
   if (!IsCautious(now)) window.num_confirming = kPair;
   return window;
+}
+
+void Mapper::AdjustAround(const KeyframeObservation& seen, MapEditor& editor) {
+  LocalWindowOptions window = Window(seen.id);
+  BundleOptions bundle = options_.bundle;
+  if (seen.features.calibration.sensor != SensorType::kMono) {
+    window.max_outer_keyframes = std::min(window.max_outer_keyframes, options_.max_outer_keyframes_with_depth);
+    bundle.max_num_iterations = std::min(bundle.max_num_iterations, options_.max_iterations_with_depth);
+  }
+  AdjustLocally(seen.id, window, bundle, motions_, editor);
 }
 
 void Mapper::ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor) {

@@ -29,6 +29,9 @@ struct MapperOptions {
   FusionOptions fusion;
   LocalWindowOptions window;
   BundleOptions bundle{.max_num_iterations = 5};  // a warm start; the next keyframe continues
+  // Around a new keyframe with depth, which brings the scale along, fewer steps and fewer poses that hold the window
+  // do as well.
+  int max_iterations_with_depth = 2, max_outer_keyframes_with_depth = 15;
   LandmarkCullingOptions landmark_culling;
   KeyframeCullingOptions keyframe_culling;
   LoopFusionOptions loop_fusion;
@@ -92,6 +95,7 @@ class Mapper {
   void RememberMotion(const KeyframeObservation& seen);
   bool IsCautious(KeyframeId now) const { return cautious_until_.valid() && now <= cautious_until_; }
   LocalWindowOptions Window(KeyframeId now) const;
+  void AdjustAround(const KeyframeObservation& seen, MapEditor& editor);
   void ObserveLandmarks(const KeyframeObservation& seen, MapEditor& editor);
   void ObserveShared(const KeyframeObservation& seen, MapEditor& editor);
   // Returns those created from pairs of keyframes.
