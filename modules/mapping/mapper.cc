@@ -146,7 +146,7 @@ std::optional<MapDelta> Mapper::Finish(const DueCorrections& due) {
 
 // Whether a keyframe went.
 bool Mapper::CullLast(KeyframeId last, MapEditor& editor) {
-  const size_t num_before = map_.keyframes().size();
+  const int64_t num_before = map_.keyframes().size();
   keyframe_culler_.CullLast(last, removed_, editor);
   return map_.keyframes().size() < num_before;
 }
