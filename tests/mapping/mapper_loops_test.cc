@@ -157,11 +157,12 @@ TEST_F(LoopMapper, AnUnusableAdjustmentChangesNothing) {
   Step({{LoopAt({12}, {5})}, {}});
   GlobalAdjustment useless;
   useless.answers = delta_.answers;
+  const std::optional<MapDelta> culled = mapper_.Finish({});
+  ASSERT_TRUE(culled.has_value()) << "one of the newest keyframes is redundant";
+  EXPECT_FALSE(culled->removed_keyframes.empty());
+  EXPECT_TRUE(culled->moved_keyframes.empty());
   const std::optional<MapDelta> delta = mapper_.Finish({{}, useless});
-  ASSERT_TRUE(delta.has_value()) << "one of the newest keyframes is redundant";
-  EXPECT_FALSE(delta->removed_keyframes.empty());
-  EXPECT_TRUE(delta->moved_keyframes.empty());
-  EXPECT_FALSE(mapper_.Finish({}).has_value()) << "then the map is final";
+  EXPECT_FALSE(delta.has_value());
 }
 
 TEST_F(LoopMapper, AtTheEndTheMapIsCorrectedOnceMore) {
