@@ -270,8 +270,8 @@ class StreetBuilder {
     for (double position = random_.Uniform(40.0, 100.0); position < length; position += random_.Uniform(90.0, 260.0)) {
       MovingCar car;
       car.way = lane;
-      car.start_m = position;
-      car.speed_mps = random_.Uniform(6.0, 11.0);
+      const double speed_mps = random_.Uniform(6.0, 11.0);
+      car.position_m = [=](double time_s) { return position + speed_mps * time_s; };
       car.body = BuildCar({0.0, 0.0}, {0.0, 1.0}, random_.Next(), builder_);
       world_.cars.push_back(std::move(car));
     }

@@ -27,9 +27,6 @@ Eigen::Vector2d PointOn(const Polyline& points, double distance_m) {
   return points[i] + (position - static_cast<double>(i)) * (points[i + 1] - points[i]);
 }
 
-// 0 to 1 for t from 0 to 1, slow at both ends.
-double Ease(double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); }
-
 // How far someone looks aside who does so once in every kPeriodS: the tangent of half the angle, to the right.
 double AsideAt(double time_s, uint32_t seed) {
   constexpr double kPeriodS = 2.75;
@@ -57,7 +54,7 @@ Rigid3 LookAlong(const Eigen::Vector3d& position, const Eigen::Vector3d& forward
 
 CarTrajectory::CarTrajectory(const Polyline& drive, double speed, uint32_t seed, const CarMotion& motion,
                              std::shared_ptr<const Terrain> terrain)
-    : points_(Resample(drive, kStepM)), seed_(seed), terrain_(std::move(terrain)) {
+    : points_(Resample(drive, kStepM)), waits_(motion.waits), seed_(seed), terrain_(std::move(terrain)) {
   const auto at = [&](ptrdiff_t i) {
     return points_[static_cast<size_t>(std::clamp<ptrdiff_t>(i, 0, static_cast<ptrdiff_t>(points_.size()) - 1))];
   };
@@ -70,6 +67,10 @@ CarTrajectory::CarTrajectory(const Polyline& drive, double speed, uint32_t seed,
     const double curvature = (at(k - 12) - 2.0 * at(k) + at(k + 12)).norm() / (9.0);
     speeds[i] = std::min(motion.cruise_mps, std::sqrt(motion.side_acceleration_mps2 / std::max(curvature, 1e-4)));
   }
+  const auto point_of = [&](const Wait& wait) {
+    return std::min(static_cast<size_t>(std::lround(wait.at_m / kStepM)), points_.size() - 1);
+  };
+  for (const Wait& wait : waits_) speeds[point_of(wait)] = 0.0;
   // v^2 = u^2 + 2 a s, forwards and backwards.
   const double gain = 2.0 * motion.acceleration_mps2 * kStepM;
   for (size_t i = 1; i < speeds.size(); ++i) {
@@ -82,11 +83,28 @@ CarTrajectory::CarTrajectory(const Polyline& drive, double speed, uint32_t seed,
   for (size_t i = 1; i < points_.size(); ++i) {
     times_s_.push_back(times_s_.back() + 2.0 * kStepM / (speed * (speeds[i - 1] + speeds[i])));
   }
+  double waited_s = 0.0;
+  for (const Wait& wait : waits_) {
+    wait_times_s_.push_back(times_s_[point_of(wait)] + waited_s);
+    waited_s += wait.duration_s;
+  }
 }
 
-double CarTrajectory::duration_s() const { return times_s_.back(); }
+double CarTrajectory::duration_s() const {
+  double duration_s = times_s_.back();
+  for (const Wait& wait : waits_) duration_s += wait.duration_s;
+  return duration_s;
+}
 
-double CarTrajectory::DistanceAt(double time_s) const { return DistanceOn(times_s_, time_s); }
+double CarTrajectory::DrivenAt(double time_s) const {
+  double driven_s = time_s;
+  for (size_t i = 0; i < waits_.size(); ++i) {
+    driven_s -= std::clamp(time_s - wait_times_s_[i], 0.0, waits_[i].duration_s);
+  }
+  return driven_s;
+}
+
+double CarTrajectory::DistanceAt(double time_s) const { return DistanceOn(times_s_, DrivenAt(time_s)); }
 Eigen::Vector2d CarTrajectory::PointAt(double distance_m) const { return PointOn(points_, distance_m); }
 
 Eigen::Vector2d CarTrajectory::PositionAt(double time_s) const { return PointAt(DistanceAt(time_s)); }
@@ -104,7 +122,8 @@ Eigen::Vector2d CarTrajectory::DirectionAt(double time_s) const {
 Rigid3 CarTrajectory::WorldFromCamera(double time_s) const {
   const Eigen::Vector2d position = PositionAt(time_s);
   const Eigen::Vector2d direction = DirectionAt(time_s);
-  const auto sway = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, axis), hertz * time_s); };
+  const double driven_s = DrivenAt(time_s);  // a car that stands doesn't sway
+  const auto sway = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, axis), hertz * driven_s); };
   const double heave = 0.012 * sway(1, 3.0);
   double height = kCameraHeightM;
   double slope = 0.0;

@@ -18,12 +18,19 @@ class Trajectory {
   virtual Rigid3 WorldFromCamera(double time_s) const = 0;
 };
 
+// A car that stands at this distance along its way for so long.
+struct Wait {
+  double at_m = 0.0;
+  double duration_s = 0.0;
+};
+
 // How someone drives.
 struct CarMotion {
   double cruise_mps = 8.0;
   double side_acceleration_mps2 = 2.2;  // at most, in bends
   double acceleration_mps2 = 1.6;       // at most, along the way
   bool drives_on = false;               // the way is part of a longer one; else the car starts and ends slowly
+  std::vector<Wait> waits;              // in their order
 };
 
 // A car that slows down in bends, on a suspension that nods, rolls and heaves a little.
@@ -34,16 +41,23 @@ class CarTrajectory : public Trajectory {
                 std::shared_ptr<const Terrain> terrain = nullptr);
   double duration_s() const override;
   Rigid3 WorldFromCamera(double time_s) const override;
+  // Along the way, m.
+  double DistanceAt(double time_s) const;
+  // When the waits begin.
+  const std::vector<double>& wait_times_s() const { return wait_times_s_; }
   // The car's position on the ground and its direction.
   Eigen::Vector2d PositionAt(double time_s) const;
   Eigen::Vector2d DirectionAt(double time_s) const;
 
  private:
-  double DistanceAt(double time_s) const;
+  // The time for which the car has moved.
+  double DrivenAt(double time_s) const;
   Eigen::Vector2d PointAt(double distance_m) const;
 
   Polyline points_;              // every kStepM
-  std::vector<double> times_s_;  // by point
+  std::vector<double> times_s_;  // by point, without the waits
+  std::vector<Wait> waits_;
+  std::vector<double> wait_times_s_;
   uint32_t seed_;
   std::shared_ptr<const Terrain> terrain_;
 };

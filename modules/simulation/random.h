@@ -50,6 +50,8 @@ class Random {
 
 // A wave like a sine of period 1, of parabolas: exact arithmetic, the same on every machine.
 double Wave(double x);
+// 0 to 1 for t from 0 to 1, slow at both ends.
+inline double Ease(double t) { return t <= 0.0 ? 0.0 : (t >= 1.0 ? 1.0 : t * t * (3.0 - 2.0 * t)); }
 // Smooth noise in [-1, 1] over a line with about one extremum per unit; equal arguments give equal values.
 double SmoothNoise(uint32_t seed, double x);
 // Smooth noise in [0, 1] over the plane, one random value per unit square's corner.

@@ -226,7 +226,7 @@ bool IsInSight(const Surface& surface, const CameraCalibration& camera, double m
 
 // The car's body at this time; nullopt once it has left its way.
 std::optional<std::vector<Surface>> PlaceCar(const MovingCar& car, double time_s) {
-  const double position = (car.start_m + car.speed_mps * time_s) / kCarStepM;
+  const double position = car.position_m(time_s) / kCarStepM;
   if (position < 1.0 || position + 2.0 >= static_cast<double>(car.way.size())) return std::nullopt;
   const auto i = static_cast<size_t>(position);
   const Eigen::Vector2d step = car.way[i + 1] - car.way[i];

@@ -127,14 +127,14 @@ Result<> SimulationOptions::Check() const {
 SimulationOptions ParseSimulation(const std::string& text) {
   SimulationOptions options;
   const std::string name = text.substr(0, text.find(','));
-  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort},
+  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort}, {"traffic", Scene::kTraffic},
                                             {"room", Scene::kRoom},     {"country", Scene::kCountry},
                                             {"walk", Scene::kWalk},     {"desk", Scene::kDesk},
                                             {"robot", Scene::kRobot}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
-                     " is unknown: give sim:street, sim:street-short, sim:room, sim:country, sim:walk, sim:desk or "
+                     " is unknown: give sim:street, sim:street-short, sim:traffic, sim:room, sim:country, sim:walk, sim:desk or "
                      "sim:robot");
   }
   options.scene = scene->second;
@@ -162,6 +162,16 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       const StreetPlan plan = MakePlan(options);
       trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed);
       world = BuildStreets(plan, options.seed);
+      break;
+    }
+    case Scene::kTraffic: {
+      const StreetPlan plan = PlanTraffic(options.seed, options.length_m);
+      CarMotion motion;
+      for (const Stop& stop : plan.stops) motion.waits.push_back({stop.at_m, stop.wait_s});
+      const auto drive = std::make_shared<const CarTrajectory>(plan.drive, options.speed, options.seed, motion);
+      world = BuildStreets(plan, options.seed);
+      AddTraffic(plan, drive, options.seed, world);
+      trajectory_ = drive;
       break;
     }
     case Scene::kRoom:

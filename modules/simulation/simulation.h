@@ -14,7 +14,7 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kRoom, kCountry, kWalk, kDesk, kRobot };
+  enum class Scene { kStreet, kStreetShort, kTraffic, kRoom, kCountry, kWalk, kDesk, kRobot };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;            // another seed, another town
   double length_m = 0.0;        // of a drive; 0: all of it
@@ -30,7 +30,7 @@ struct SimulationOptions {
   Result<> Check() const;
 };
 
-// Reads the name of a world (street, street-short, room, country, walk, desk, robot) and options behind it:
+// Reads the name of a world (street, street-short, traffic, room, country, walk, desk, robot) and options behind it:
 // "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 
@@ -64,7 +64,7 @@ class Simulation {
   double frames_per_s_ = 10.0;
   double readout_s_ = 0.0;
   int64_t num_frames_ = 0;
-  std::unique_ptr<Trajectory> trajectory_;
+  std::shared_ptr<const Trajectory> trajectory_;
   std::unique_ptr<Renderer> renderer_;
   std::unique_ptr<EffectsPipeline> effects_;
   Rendering rendering_;

@@ -4,9 +4,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
+#include "simulation/drive.h"
 #include "simulation/paint.h"
 #include "simulation/random.h"
 #include "simulation/street_map.h"
@@ -35,12 +37,10 @@ struct Surface {
   }
 };
 
-// A car that drives along a line, against the camera's direction.
 struct MovingCar {
-  Polyline way;          // every kCarStepM
-  double start_m = 0.0;  // its position along the way at time 0
-  double speed_mps = 0.0;
-  std::vector<Surface> body;  // around the origin, facing +z
+  Polyline way;                              // every kCarStepM
+  std::function<double(double)> position_m;  // along the way, at a time (s); there is none before and behind it
+  std::vector<Surface> body;                 // around the origin, facing +z
 };
 inline constexpr double kCarStepM = 0.5;
 
@@ -96,6 +96,9 @@ void PlantTree(const TreeKind& kind, const Eigen::Vector2d& foot, double ground_
 
 // Houses, trees, parked and driving cars along the streets; the drive stays free.
 World BuildStreets(const StreetPlan& plan, uint32_t seed);
+// Besides, vehicles that cross in front of the waiting car, large ones among them, from both sides; and from 0.4 of the
+// way to 0.75 a lorry in front of it, that stops as it does and starts 1.5 s earlier.
+void AddTraffic(const StreetPlan& plan, const std::shared_ptr<const CarTrajectory>& drive, uint32_t seed, World& world);
 // A furnished room with its middle at the origin; x, height, z.
 World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);
 // A desk at the origin, 0.72 m high, seen from where z is negative; a room around it.

@@ -1,0 +1,99 @@
+// Vehicles that take much of the image, and move.
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/random.h"
+#include "simulation/world.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kLaneM = 0.5 * kRoadHalfWidthM;  // from the street's middle
+
+class TrafficBuilder {
+ public:
+  TrafficBuilder(const StreetPlan& plan, const std::shared_ptr<const CarTrajectory>& drive, uint32_t seed, World& world)
+      : plan_(plan), drive_(drive), world_(world), builder_(world), random_(HashOf(seed, 51)) {}
+
+  void Build() {
+    for (size_t i = 0; i < plan_.stops.size(); ++i) {
+      const Stop& stop = plan_.stops[i];
+      const Polyline from_left = stop.crossing, from_right(from_left.rbegin(), from_left.rend());
+      Cross(from_left, stop, drive_->wait_times_s()[i]);
+      Cross(from_right, stop, drive_->wait_times_s()[i]);
+    }
+    Lead();
+  }
+
+ private:
+  // One behind the other on the right lane, until the wait is over.
+  void Cross(const Polyline& middle, const Stop& stop, double begin_s) {
+    const Polyline lane = Resample(Shift(Resample(middle, kCarStepM), kLaneM), kCarStepM);
+    const Eigen::Vector2d eye = PointAlong(plan_.drive, stop.at_m);
+    const auto nearest = std::min_element(lane.begin(), lane.end(), [&](const auto& a, const auto& b) {
+      return (a - eye).squaredNorm() < (b - eye).squaredNorm();
+    });
+    const double passes_m = kCarStepM * static_cast<double>(nearest - lane.begin());
+    const double speed_mps = random_.Uniform(3.5, 6.0);
+    for (double passes_s = begin_s + random_.Uniform(0.0, 2.0); passes_s < begin_s + stop.wait_s - 1.5;
+         passes_s += random_.Uniform(14.0, 22.0) / speed_mps) {
+      MovingCar car;
+      car.way = lane;
+      car.position_m = [=](double time_s) { return passes_m + speed_mps * (time_s - passes_s); };
+      car.body =
+          random_.Chance(0.6) ? BuildBox(random_.Uniform(6.0, 12.0)) : BuildCar(kOrigin, kAhead, Seed(), builder_);
+      world_.cars.push_back(std::move(car));
+    }
+  }
+
+  // As far ahead as the camera's car gets in a second and a half, and half its own length and 7 m more.
+  void Lead() {
+    constexpr double kLengthM = 8.0, kGapM = 7.0, kHeadwayS = 1.5, kComesM = 150.0, kLeavesM = 280.0;
+    const double length_m = LengthOf(plan_.drive);
+    const double from_m = 0.4 * length_m, to_m = 0.75 * length_m;
+    MovingCar lorry;
+    lorry.way = Resample(plan_.drive, kCarStepM);
+    lorry.position_m = [=, drive = drive_](double time_s) {
+      const double there_m = drive->DistanceAt(std::min(time_s + kHeadwayS, drive->duration_s()));
+      const double farther_m =
+          60.0 * (1.0 - Ease((there_m - from_m) / kComesM)) + 200.0 * Ease((there_m - to_m) / kLeavesM);
+      return there_m + kGapM + 0.5 * kLengthM + farther_m;
+    };
+    lorry.body = BuildBox(kLengthM);
+    world_.cars.push_back(std::move(lorry));
+  }
+
+  // A bus or a lorry.
+  std::vector<Surface> BuildBox(double length_m) {
+    constexpr double kHalfWidthM = 1.25;
+    const double height_m = random_.Uniform(2.8, 3.6);
+    const bool is_bus = random_.Chance(0.5);
+    const uint32_t seed = Seed();
+    const int32_t sides =
+        builder_.AddPaint({is_bus ? Material::kFacade : Material::kCarSide, seed, length_m, height_m, 0.02});
+    const int32_t ends = builder_.AddPaint({Material::kSign, seed + 1, 2.0 * kHalfWidthM, height_m, 0.02});
+    return builder_.Box(kOrigin, kAhead, 0.5 * length_m, kHalfWidthM, 0.25, height_m, sides, ends);
+  }
+
+  static Eigen::Vector2d PointAlong(const Polyline& line, double distance_m) {
+    return Shorten(line, std::max(distance_m, 1.0)).back();
+  }
+  uint32_t Seed() { return random_.Next(); }
+
+  inline static const Eigen::Vector2d kOrigin{0.0, 0.0}, kAhead{0.0, 1.0};
+
+  const StreetPlan& plan_;
+  std::shared_ptr<const CarTrajectory> drive_;
+  World& world_;
+  WorldBuilder builder_;
+  Random random_;
+};
+
+}  // namespace
+
+void AddTraffic(const StreetPlan& plan, const std::shared_ptr<const CarTrajectory>& drive, uint32_t seed,
+                World& world) {
+  TrafficBuilder(plan, drive, seed, world).Build();
+}
+
+}  // namespace tessera
