@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -36,6 +37,18 @@ double CellCoverage(const TrackedFrame& frame) {
     is_covered[Index(kCoverageColumns * row + cell(keypoint.x_px, camera.width_px, kCoverageColumns))] = true;
   }
   return static_cast<double>(std::ranges::count(is_covered, true)) / static_cast<double>(is_covered.size());
+}
+
+// Of the points with depth that the frame sees, the share that this keyframe saw, or one before it.
+double ShareKnownAt(const Map& map, KeyframeId keyframe, const TrackedFrame& frame) {
+  int num = 0, num_known = 0;
+  for (const SeenPoint& point : frame.points) {
+    if (!point.valid() || !HasDepth(point.landmark, frame.world_from_camera.translation)) continue;
+    ++num;
+    const std::span<const Observation> observations = map.ObservationsOf(point.id.landmark);
+    num_known += !observations.empty() && observations.front().keyframe <= keyframe ? 1 : 0;
+  }
+  return num > 0 ? static_cast<double>(num_known) / num : 0.0;
 }
 
 }  // namespace
@@ -159,6 +172,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   ground_.ForgetSteps();
   mending_.reset();
   reference_ = ReferenceKeyframe{.id = answer.reference, .scale = world_from_reference->scale};
+  scale_.GoOnFrom(reference_.id);
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
   ForgetMotion();
@@ -423,9 +437,15 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
 }
 
 void MapTracker::WatchScale() {
-  const Rigid3& way = last_->reference_from_camera;
-  scale_.Add(last_->frame.view->features().utime_us, way.rotation.inverse() * way.translation,
-             last_->covariance.value_or(Eigen::Matrix3d::Zero()));
+  const TrackedFrame& frame = last_->frame;
+  const Sim3 world_from_reference = WorldFromReference();
+  const bool is_since_kept = replica_.WorldFromKeyframe(scale_.since()).has_value();
+  const KeyframeId from = is_since_kept ? scale_.since() : reference_.id;
+  const Sim3 world_from_start = replica_.WorldFromKeyframe(from).value_or(world_from_reference);
+  const Eigen::Vector3d way = frame.world_from_camera.translation - world_from_start.translation;
+  scale_.Add(next_keyframe_, frame.view->features().utime_us,
+             frame.world_from_camera.rotation.conjugate() * way / world_from_reference.scale,
+             last_->covariance.value_or(Eigen::Matrix3d::Zero()), ShareKnownAt(replica_.map(), from, frame));
 }
 
 void MapTracker::WatchGround(const TrackedFrame& frame, const CaptureTimes::Step& step, const StepPose& pose) {

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <deque>
 
+#include "core/ids.h"
+
 namespace tessera {
 
 // What follows a step lies on the scale of that step: its points are triangulated from it. So the errors of the steps
@@ -14,12 +16,22 @@ namespace tessera {
 //
 // Where near points are seen, it grows by some percent a minute. Where the view holds hardly any, a second is enough
 // for a factor of two, while all residuals stay small.
+//
+// A camera that stands makes keyframes, too, when something passes in front of it. Their steps are far less than their
+// errors, but nothing is triangulated from them: most points are known from before, and hold the scale. Such a step
+// doesn't count, and the next one begins where it began.
 class ScaleWatch {
  public:
   // A new part of the map begins, with a scale of its own.
   void Restart() { *this = {}; }
-  // `step`: the camera's way from the last keyframe to this one, in its own axes; `covariance`: of it, by images alone.
-  void Add(int64_t utime_us, const Eigen::Vector3d& step, const Eigen::Matrix3d& covariance);
+  // The camera was found at a keyframe of the map: its next step begins there.
+  void GoOnFrom(KeyframeId keyframe) { since_ = keyframe; }
+  // `step`: the camera's way to this keyframe from since(), or else from the last one, in its own axes; `covariance`:
+  // of it, by images alone; `known_share`: of the points with depth that it sees, those that were known there.
+  void Add(KeyframeId keyframe, int64_t utime_us, const Eigen::Vector3d& step, const Eigen::Matrix3d& covariance,
+           double known_share);
+  // Where the step begins that is under way; invalid: nowhere yet.
+  KeyframeId since() const { return since_; }
 
   // Standard deviations of the logarithm: since the part began, without regard to loops, and over the kRecent_us that
   // end at `utime_us`.
@@ -33,6 +45,7 @@ class ScaleWatch {
     int64_t utime_us = 0;
     double variance = 0.0;
   };
+  KeyframeId since_;
   double variance_ = 0.0;
   std::deque<Step> recent_;
 };
