@@ -1,5 +1,6 @@
 // Vehicles that take much of the image, and move.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "simulation/random.h"
@@ -67,10 +68,11 @@ class TrafficBuilder {
   std::vector<Surface> BuildBox(double length_m) {
     constexpr double kHalfWidthM = 1.25;
     const double height_m = random_.Uniform(2.8, 3.6);
-    const bool is_bus = random_.Chance(0.5);
+    // Windows, a plain side, or advertisements.
+    constexpr std::array kSides{Material::kFacade, Material::kCarSide, Material::kSign};
+    const Material side = kSides[static_cast<size_t>(random_.Index(kSides.size()))];
     const uint32_t seed = Seed();
-    const int32_t sides =
-        builder_.AddPaint({is_bus ? Material::kFacade : Material::kCarSide, seed, length_m, height_m, 0.02});
+    const int32_t sides = builder_.AddPaint({side, seed, length_m, height_m, 0.02});
     const int32_t ends = builder_.AddPaint({Material::kSign, seed + 1, 2.0 * kHalfWidthM, height_m, 0.02});
     return builder_.Box(kOrigin, kAhead, 0.5 * length_m, kHalfWidthM, 0.25, height_m, sides, ends);
   }

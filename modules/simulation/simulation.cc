@@ -95,7 +95,8 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
                                                {"noise", &options.noise},
                                                {"scale", &options.scale},
                                                {"readout", &options.readout_ms},
-                                               {"depth_delay", &options.depth_delay_ms}};
+                                               {"depth_delay", &options.depth_delay_ms},
+                                               {"stop", &options.stop_m}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
@@ -103,7 +104,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
   } else {
     throw InputError("sim: `" + key + "=" + value +
                      "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-                     "depth_delay (ms), speed, noise, scale or path");
+                     "depth_delay (ms), stop (m), speed, noise, scale or path");
   }
 }
 
@@ -121,21 +122,23 @@ Result<> SimulationOptions::Check() const {
   if (!(depth_delay_ms >= -100.0 && depth_delay_ms <= 100.0)) {
     return Failed("sim: depth_delay must be between -100 and 100 ms");
   }
+  if (!(stop_m >= 7.0 && stop_m <= 20.0)) return Failed("sim: stop must be between 7 and 20 m");
   return {};
 }
 
 SimulationOptions ParseSimulation(const std::string& text) {
   SimulationOptions options;
   const std::string name = text.substr(0, text.find(','));
-  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet}, {"street-short", Scene::kStreetShort}, {"traffic", Scene::kTraffic},
-                                            {"room", Scene::kRoom},     {"country", Scene::kCountry},
-                                            {"walk", Scene::kWalk},     {"desk", Scene::kDesk},
-                                            {"robot", Scene::kRobot}};
+  const std::map<std::string, Scene> scenes{{"street", Scene::kStreet},   {"street-short", Scene::kStreetShort},
+                                            {"traffic", Scene::kTraffic}, {"room", Scene::kRoom},
+                                            {"country", Scene::kCountry}, {"walk", Scene::kWalk},
+                                            {"desk", Scene::kDesk},       {"robot", Scene::kRobot}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
-    throw InputError("sim:" + name +
-                     " is unknown: give sim:street, sim:street-short, sim:traffic, sim:room, sim:country, sim:walk, sim:desk or "
-                     "sim:robot");
+    throw InputError(
+        "sim:" + name +
+        " is unknown: give sim:street, sim:street-short, sim:traffic, sim:room, sim:country, sim:walk, sim:desk or "
+        "sim:robot");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -165,7 +168,7 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       break;
     }
     case Scene::kTraffic: {
-      const StreetPlan plan = PlanTraffic(options.seed, options.length_m);
+      const StreetPlan plan = PlanTraffic(options.seed, options.length_m, options.stop_m);
       CarMotion motion;
       for (const Stop& stop : plan.stops) motion.waits.push_back({stop.at_m, stop.wait_s});
       const auto drive = std::make_shared<const CarTrajectory>(plan.drive, options.speed, options.seed, motion);

@@ -24,6 +24,7 @@ struct SimulationOptions {
   double scale = 1.0;           // times the usual size of images
   double readout_ms = -1.0;     // rolling shutter: from the first row to the last; -1: that of the world's camera
   double depth_delay_ms = 0.0;  // RGB-D: depth is taken so much later than the image, as by a Kinect
+  double stop_m = 12.0;         // traffic: it stops so far before the middle of a crossing
   std::string path;             // a drive along the poses of a KITTI file instead of through the town
 
   // Fails if a value is out of range.

@@ -140,8 +140,7 @@ StreetPlan PlanRound(uint32_t seed, double length_m) {
   return plan;
 }
 
-StreetPlan PlanTraffic(uint32_t seed, double length_m) {
-  constexpr double kStopM = 12.0; // before the middle of the crossing
+StreetPlan PlanTraffic(uint32_t seed, double length_m, double stop_m) {
   constexpr double kWaitS = 9.0;
   const std::vector<Crossing> walk{{1, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {2, 0}, {1, 0}, {1, 1}, {1, 2}};
   StreetPlan plan = PlanWalk(walk, seed, 0.0);
@@ -151,12 +150,12 @@ StreetPlan PlanTraffic(uint32_t seed, double length_m) {
   for (const Polyline& street : across.streets) crossing.insert(crossing.end(), street.begin(), street.end());
   plan.drive = Begin(Shorten(std::move(plan.drive), LengthOf(plan.drive) - 40.0), length_m);
   const StreetMap crossings({crossing});
-  double along_m = 0.0, last_m = -kStopM;
+  double along_m = 0.0, last_m = -stop_m;
   for (size_t i = 0; i + 1 < plan.drive.size(); ++i) {
     const Eigen::Vector2d step = plan.drive[i + 1] - plan.drive[i];
     along_m += step.norm();
-    const bool is_there = crossings.DistanceToStreet(plan.drive[i]) < kStopM;
-    if (!is_there || along_m - last_m < 4.0 * kStopM) continue;
+    const bool is_there = crossings.DistanceToStreet(plan.drive[i]) < stop_m;
+    if (!is_there || along_m - last_m < 4.0 * stop_m) continue;
     last_m = along_m;
     const bool from_left = (crossing.back() - crossing.front()).dot(RightOf(step)) > 0.0;
     plan.stops.push_back({along_m, kWaitS, from_left ? crossing : Polyline(crossing.rbegin(), crossing.rend())});

@@ -31,8 +31,9 @@ struct StreetPlan {
 StreetPlan PlanTown(uint32_t seed, double length_m);
 // One round of blocks that overlaps its beginning by some 40 m.
 StreetPlan PlanRound(uint32_t seed, double length_m);
-// A block and its first sides again. Where it crosses a street it waits for those who are on it, three times.
-StreetPlan PlanTraffic(uint32_t seed, double length_m);
+// A block and its first sides again. Where it crosses a street it waits for those who are on it, three times, so far
+// before the middle of the crossing.
+StreetPlan PlanTraffic(uint32_t seed, double length_m, double stop_m);
 // A drive along the true trajectory of a KITTI sequence (rows of 3x4 matrices); heights are ignored. Throws InputError.
 StreetPlan PlanFromPoses(const std::string& path, double length_m);
 

@@ -21,7 +21,7 @@ double ChangedShare(const Rendering& a, const Rendering& b) {
 }
 
 TEST(PlanTraffic, StopsBeforeEachCrossing) {
-  const StreetPlan plan = PlanTraffic(3, 0.0);
+  const StreetPlan plan = PlanTraffic(3, 0.0, 12.0);
   ASSERT_EQ(plan.stops.size(), 3U);
   for (const Stop& stop : plan.stops) {
     const double distance_m = StreetMap({stop.crossing}).DistanceToStreet(Shorten(plan.drive, stop.at_m).back());
