@@ -1,5 +1,6 @@
 #include "tracking/confirmed_points.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <numeric>
 #include <span>
@@ -14,7 +15,6 @@ namespace {
 // Of a confirmed point: large features that moved by some pixels still pass for the same, but not for long.
 constexpr size_t kMinObservers = 3;
 constexpr int64_t kMinStanding_us = 500'000;
-constexpr int kMinConfirmed = 25;  // fewer fix no pose by themselves
 // The pose by all points contradicts the confirmed ones if it has less than this share of the inliers among them that
 // could be had (at usual frames it has nearly all), and that isn't chance.
 constexpr double kMinShareByAll = 0.95;
@@ -51,8 +51,19 @@ bool FitsBetter(const std::vector<char>& is_confirmed, const PoseOptimizationRes
 
 }  // namespace
 
-PoseOptimizationResult OptimizeByConfirmed(const MapReplica& replica, const PoseOptimizationOptions& options,
-                                           const PosePrior* prior, TrackedFrame& frame) {
+int NumConfirmed(const MapReplica& replica, const TrackedFrame& frame) {
+  return static_cast<int>(std::ranges::count_if(frame.points, [&](const SeenPoint& point) {
+    return point.valid() && IsConfirmed(replica.map(), point.id.landmark);
+  }));
+}
+
+KnownPoints OnlyConfirmed(const MapReplica& replica, KnownPoints points) {
+  std::erase_if(points, [&](const auto& known) { return !IsConfirmed(replica.map(), known.first.landmark); });
+  return points;
+}
+
+PoseByConfirmed OptimizeByConfirmed(const MapReplica& replica, const PoseOptimizationOptions& options,
+                                    const PosePrior* prior, TrackedFrame& frame) {
   std::vector<char> is_confirmed;  // by point that the frame sees
   for (const SeenPoint& point : frame.points) {
     if (point.valid()) is_confirmed.push_back(IsConfirmed(replica.map(), point.id.landmark) ? 1 : 0);
@@ -66,7 +77,8 @@ PoseOptimizationResult OptimizeByConfirmed(const MapReplica& replica, const Pose
     if (agree && FitsBetter(is_confirmed, own, pose)) pose = std::move(own);
   }
   TakePose(pose, frame);
-  return pose;
+  const int num_agreeing = NumInliers(is_confirmed, pose);
+  return {std::move(pose), num, num_agreeing};
 }
 
 }  // namespace tessera

@@ -26,6 +26,9 @@ constexpr double kMinShareOfMatches = 0.5, kMinShareOfLast = 0.4;
 constexpr double kMaxPriorSigma_px = 2.0, kMaxTurnFromPrediction_rad = 0.01;
 constexpr double kMaxDirectionSigma_rad = 0.1, kMaxVehicleSigma_px = 5.0;
 
+// Of the confirmed points that agree with one pose, those that agree with another of the same scene.
+constexpr double kMinShareOfConfirmed = 0.3;
+
 // With depth, two frames by themselves are asked only where fewer points agree: that takes ten times as long as all the
 // tries, and more points are hardly wrong by chance.
 constexpr int kFewWithDepth = 100;
@@ -43,8 +46,13 @@ Result<> FrameSearchOptions::Check() const {
 }
 
 FrameSearch::FrameSearch(Frame view, const TrackedFrame& last, const ExpectedFrame& expected, const MapReplica& replica,
-                         const FrameSearchOptions& options)
-    : view_(std::move(view)), last_(last), expected_(expected), replica_(replica), options_(options) {}
+                         const FrameSearchOptions& options, bool by_confirmed)
+    : view_(std::move(view)),
+      last_(last),
+      expected_(expected),
+      replica_(replica),
+      options_(options),
+      by_confirmed_(by_confirmed) {}
 
 std::optional<FoundFrame> FrameSearch::Follow() {
   Best best;
@@ -90,6 +98,14 @@ bool FrameSearch::IsAsExpected(const Rigid3& world_from_camera) const {
          ExpectedSigma_px() < (is_vehicle ? kMaxVehicleSigma_px : kMaxPriorSigma_px);
 }
 
+// More points agree; but something that fills the image and moves has hardly any confirmed ones.
+bool FrameSearch::IsBetter(int num_inliers, int num_confirmed, const Best& best) const {
+  if (by_confirmed_) return std::pair(num_confirmed, num_inliers) > std::pair(best.num_confirmed, best.num_inliers);
+  const int most = std::max(num_confirmed, best.num_confirmed), fewest = std::min(num_confirmed, best.num_confirmed);
+  if (most >= kMinConfirmed && fewest < kMinShareOfConfirmed * most) return num_confirmed == most;
+  return num_inliers > best.num_inliers;
+}
+
 // Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
 bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const {
   ++best.num_tries;
@@ -97,10 +113,12 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   frame.world_from_camera = world_from_camera;
   const int num = MatchLast(last_, widening * options_.matching.last_radius_px, options_.matching, frame);
   if (num < options_.min_last_matches) return false;
-  const int num_inliers = OptimizeByConfirmed(replica_, options_.pose, prior, frame).num_inliers;
+  const PoseByConfirmed pose = OptimizeByConfirmed(replica_, options_.pose, prior, frame);
+  const int num_inliers = pose.optimized.num_inliers;
   const Rigid3 found = frame.world_from_camera;
-  if (num_inliers > best.num_inliers) {
+  if (IsBetter(num_inliers, pose.num_agreeing, best)) {
     best.num_inliers = num_inliers;
+    best.num_confirmed = pose.num_agreeing;
     best.frame = std::move(frame);
   }
   if (num_inliers < options_.min_last_matches / 2) return false;
@@ -139,6 +157,7 @@ std::optional<FoundFrame> FrameSearch::SearchAnywhere() const {
   for (const SeenPoint& point : last_.points) {
     if (point.valid()) points.emplace_back(point.id, point.landmark);
   }
+  if (by_confirmed_) points = OnlyConfirmed(replica_, std::move(points));
   TrackedFrame frame(view_);
   MatchAnywhere(points, options_.matching, frame);
   std::vector<PointPixel> pairs;

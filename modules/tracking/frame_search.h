@@ -42,9 +42,10 @@ class FrameSearch {
  public:
   using Frame = std::shared_ptr<const FrameView>;
 
-  // `last`, `replica` and `options` must outlive the search.
+  // `last`, `replica` and `options` must outlive the search. `by_confirmed`: FindAnywhere() looks for confirmed points
+  // only, and the try with the most of them is the best.
   FrameSearch(Frame view, const TrackedFrame& last, const ExpectedFrame& expected, const MapReplica& replica,
-              const FrameSearchOptions& options);
+              const FrameSearchOptions& options, bool by_confirmed = false);
 
   const Frame& view() const { return view_; }
 
@@ -67,11 +68,13 @@ class FrameSearch {
   struct Best {
     std::optional<TrackedFrame> frame;
     int num_inliers = 0;
+    int num_confirmed = 0;  // of these
     int num_tries = 0;
   };
 
   std::optional<FoundFrame> SearchAnywhere() const;
   std::optional<Rigid3> SearchByPair() const;
+  bool IsBetter(int num_inliers, int num_confirmed, const Best& best) const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
   double ExpectedSigma_px() const;
   bool IsAsExpected(const Rigid3& world_from_camera) const;
@@ -82,6 +85,7 @@ class FrameSearch {
   const ExpectedFrame expected_;
   const MapReplica& replica_;
   const FrameSearchOptions& options_;
+  const bool by_confirmed_;
   std::optional<std::optional<FoundFrame>> anywhere_;
   std::optional<std::optional<Rigid3>> by_pair_;
 };

@@ -16,9 +16,10 @@ struct LocalizedFrame {
   std::optional<Eigen::Matrix3d> covariance = std::nullopt;  // of the camera's center, in its axes and those units
   std::optional<PoseInfluences> influences = std::nullopt;
   std::optional<Matrix6d> way_covariance = std::nullopt;  // of the way from the reference to here
-  int num_outliers = 0;                                   // points that were matched and contradict the pose
-  bool is_wide_step = false;                              // FoundFrame::is_wide
-  bool is_doubtful = false;                               // PoseEstimate::is_step_doubtful
+  int num_known = 0;          // points that it saw before it brought new ones, as a keyframe does
+  int num_outliers = 0;       // points that were matched and contradict the pose
+  bool is_wide_step = false;  // FoundFrame::is_wide
+  bool is_doubtful = false;   // PoseEstimate::is_step_doubtful
 };
 
 }  // namespace tessera

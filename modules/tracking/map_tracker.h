@@ -103,10 +103,16 @@ class MapTracker {
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
 
-  std::optional<ExpectedStep> ExpectStep(const FrameView& view) const;
+  std::optional<ExpectedStep> ExpectStep(const FrameView& view,
+                                         const std::optional<Eigen::Quaterniond>& last_from_current = {}) const;
   ExpectedFrame Expect(const FrameView& view) const;
   bool Localize(const CapturedFrame& captured, FrameSearch& search);
   StepPose OptimizeWithMotion(TrackedFrame& frame) const;
+  int MinInliers(int num_matches) const;
+  bool HidesScene(const TrackedFrame& frame, const StepPose& pose) const;
+  bool IsConfirmed(const TrackedFrame& frame, const StepPose& pose) const;
+  bool WasConfirmedBefore(const FrameView& view) const;
+  bool Jumps(const FrameView& view, const Rigid3& world_from_camera, const Matrix6d& information) const;
   std::optional<CaptureTimes::Step> StepTo(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame, const StepPose& pose, bool is_wide_step, int num_outliers);
   bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);
@@ -145,8 +151,10 @@ class MapTracker {
   int64_t previous_utime_us_ = 0;            // of the frame before
   std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
-  LostWay lost_way_;  // since the last frame with a pose
-  Frame asked_;       // the frame that asked last
+  std::optional<int64_t> confirmed_us_;  // of the last frame whose pose confirmed points agreed with
+  std::optional<int64_t> hidden_us_;     // when something that moves hid the scene; nullopt: not lately
+  LostWay lost_way_;                     // since the last frame with a pose
+  Frame asked_;                          // the frame that asked last
 };
 
 }  // namespace tessera

@@ -93,6 +93,11 @@ std::optional<MotionPrediction> MotionModel::Predict(double interval_s,
   return prediction;
 }
 
+bool IsJump(const MotionPrediction& prediction, const Rigid3& motion, const Eigen::Matrix3d& covariance) {
+  const Eigen::Vector3d difference = motion.translation - prediction.last_from_current.translation;
+  return difference.dot((prediction.covariance + covariance).inverse() * difference) > 3.0 * kMaxSigmas * kMaxSigmas;
+}
+
 StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, const Eigen::Matrix3d& covariance) {
   if (!prediction.is_learned) return StepEvidence::kStrong;
   if (!prediction.is_steady) {
@@ -102,10 +107,8 @@ StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, 
   const Eigen::Vector3d& step = prediction.last_from_current.translation;
   const double squared = step.squaredNorm();
   if (step.dot(covariance * step) > kWeakShare * kWeakShare * squared * squared) return StepEvidence::kWeak;
-  const Eigen::Vector3d difference = by_images.translation - step;
-  const double chi2 = difference.dot((prediction.covariance + covariance).inverse() * difference);
   const double share = by_images.translation.dot(step) / squared;
-  const bool is_plausible = chi2 <= 3.0 * kMaxSigmas * kMaxSigmas || (share >= kMinShare && share <= kMaxShare);
+  const bool is_plausible = (share >= kMinShare && share <= kMaxShare) || !IsJump(prediction, by_images, covariance);
   return is_plausible ? StepEvidence::kStrong : StepEvidence::kContradictory;
 }
 

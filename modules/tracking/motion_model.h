@@ -68,6 +68,10 @@ class MotionModel {
   double walk_ = 0.0;                                    // q, units^2/s^3
 };
 
+// Whether this motion (last_from_current), its translation known to `covariance`, is more than five standard deviations
+// an axis off.
+bool IsJump(const MotionPrediction& prediction, const Rigid3& motion, const Eigen::Matrix3d& covariance);
+
 // What images say about a step against what was predicted.
 enum class StepEvidence {
   kStrong,  // they fix the step, or nothing steady was predicted
@@ -77,7 +81,7 @@ enum class StepEvidence {
 };
 
 // `by_images` and `covariance`: the motion (last_from_current) and its translation's covariance by images alone. A
-// contradiction is a difference of more than five standard deviations an axis that changes the length along the
+// contradiction is a jump that changes the length along the
 // prediction by a third at least.
 StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, const Eigen::Matrix3d& covariance);
 

@@ -18,13 +18,14 @@ constexpr double kMinDoubtfulShift_px = 10.0;
 // A pose with the points that agree with it.
 struct Optimized {
   PoseOptimizationResult pose;
+  int num_confirmed_matches, num_confirmed;
   TrackedFrame frame;
 };
 
 Optimized Optimize(const MapReplica& replica, const PoseOptimizationOptions& options, const PosePrior* prior,
                    TrackedFrame frame) {
-  PoseOptimizationResult pose = OptimizeByConfirmed(replica, options, prior, frame);
-  return {std::move(pose), std::move(frame)};
+  PoseByConfirmed pose = OptimizeByConfirmed(replica, options, prior, frame);
+  return {std::move(pose.optimized), pose.num_confirmed, pose.num_agreeing, std::move(frame)};
 }
 
 // Points beside one another err alike, which no covariance knows of: a thousand of them on one wall seem to fix how the
@@ -34,11 +35,8 @@ bool FitsAsWell(const PoseOptimizationResult& pose, const PoseOptimizationResult
 }
 
 StepEvidence JudgeStep(const ExpectedStep& expected, const Optimized& by_images) {
-  const Sim3& world_from_reference = expected.world_from_reference;
-  const Rigid3 reference_from_camera = (world_from_reference.Inverse() * by_images.frame.world_from_camera).Pose();
-  const double area = world_from_reference.scale * world_from_reference.scale;
-  return Judge(expected.motion, expected.reference_from_last.Inverse() * reference_from_camera,
-               TranslationCovariance(by_images.pose.information) / area);
+  return Judge(expected.motion, expected.MotionTo(by_images.frame.world_from_camera),
+               expected.CovarianceBy(by_images.pose.information));
 }
 
 bool IsFarFromExpected(const ExpectedStep& expected, const TrackedFrame& frame) {
@@ -57,9 +55,20 @@ PosePrior ExpectedStep::Prior() const {
   return {WorldFromCamera().Inverse(), (motion.covariance * area).inverse()};
 }
 
+Rigid3 ExpectedStep::MotionTo(const Rigid3& world_from_camera) const {
+  return reference_from_last.Inverse() * (world_from_reference.Inverse() * world_from_camera).Pose();
+}
+
+Eigen::Matrix3d ExpectedStep::CovarianceBy(const Matrix6d& information) const {
+  return TranslationCovariance(information) / (world_from_reference.scale * world_from_reference.scale);
+}
+
 StepPose OptimizeStep(const MapReplica& replica, const PoseOptimizationOptions& options, const ExpectedStep* expected,
                       TrackedFrame& frame) {
-  if (expected == nullptr) return {.optimized = OptimizeByConfirmed(replica, options, nullptr, frame)};
+  if (expected == nullptr) {
+    PoseByConfirmed pose = OptimizeByConfirmed(replica, options, nullptr, frame);
+    return {std::move(pose.optimized), pose.num_confirmed, pose.num_agreeing};
+  }
   const PosePrior prior = expected->Prior();
   Optimized with_motion = Optimize(replica, options, &prior, frame);
   Optimized by_images = Optimize(replica, options, nullptr, with_motion.frame);
@@ -82,7 +91,7 @@ StepPose OptimizeStep(const MapReplica& replica, const PoseOptimizationOptions& 
   frame = std::move(taken.frame);
   const bool is_doubtful =
       evidence == StepEvidence::kContradictory && (!has_depth || IsFarFromExpected(*expected, frame));
-  return {std::move(taken.pose), evidence, is_doubtful};
+  return {std::move(taken.pose), with_motion.num_confirmed_matches, taken.num_confirmed, evidence, is_doubtful};
 }
 
 }  // namespace tessera

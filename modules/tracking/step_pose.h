@@ -1,6 +1,7 @@
 // The pose of a frame by what it sees, and by how the camera moved a moment ago.
 #pragma once
 
+#include "geometry/body_state.h"
 #include "geometry/pose_optimization.h"
 #include "matching/point_matching.h"
 #include "tracking/map_replica.h"
@@ -16,10 +17,16 @@ struct ExpectedStep {
 
   Rigid3 WorldFromCamera() const;
   PosePrior Prior() const;
+  // The motion (last_from_current) of a camera that is here, and the covariance of its translation by this information
+  // about its pose.
+  Rigid3 MotionTo(const Rigid3& world_from_camera) const;
+  Eigen::Matrix3d CovarianceBy(const Matrix6d& information) const;
 };
 
 struct StepPose {
   PoseOptimizationResult optimized;
+  int num_confirmed_matches = 0;  // of the points that the frame saw
+  int num_confirmed = 0;          // of these, with which the pose agrees
   StepEvidence evidence = StepEvidence::kStrong;
   bool is_doubtful = false;  // it contradicts the motion, and may be wrong by much
 };

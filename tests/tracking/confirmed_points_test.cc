@@ -36,7 +36,7 @@ class OptimizeByConfirmedTest : public testing::Test {
     }
     return num_moved;
   }
-  PoseOptimizationResult Optimize() { return OptimizeByConfirmed(replica_, {}, nullptr, *frame_); }
+  PoseOptimizationResult Optimize() { return OptimizeByConfirmed(replica_, {}, nullptr, *frame_).optimized; }
 
   const Eigen::Vector3d way_{0.4, 0.0, 0.2};
   SyntheticWorld world_{SensorType::kStereo};
