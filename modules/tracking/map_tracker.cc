@@ -21,6 +21,7 @@ constexpr double kLongLost_s = 2.0;   // since the last pose: the camera may be 
 // Confirmed points that say whether a pose is that of the scene: so many, and this share agrees with it.
 constexpr int kTellingConfirmed = 8;
 constexpr double kMinConfirmedShare = 0.3, kSureConfirmedShare = 0.8;
+constexpr double kMaxStanding_px = 3.0;          // in kDriftInterval_s, as noise has it
 constexpr double kMinJump_px = 10.0;             // in the image
 constexpr int64_t kHiddenWithin_us = 1'000'000;  // since such points agreed last
 constexpr int64_t kMaxHidden_us = 10'000'000;    // longer, what hides the scene is the scene
@@ -421,7 +422,10 @@ bool MapTracker::StartFromPair(const Frame& view, std::vector<KeyframeObservatio
 // Whether the loss has lasted so long that a new part of the map should begin.
 bool MapTracker::NoteLoss(const Frame& view) {
   const int64_t utime_us = view->features().utime_us;
-  if (!lost_since_us_) lost_since_us_ = utime_us;
+  if (!lost_since_us_) {
+    lost_since_us_ = utime_us;
+    if (last_ && StoodStill()) hidden_us_ = utime_us;
+  }
   if (last_ && !lost_way_.has_begun()) BeginLostWay();
   if (lost_way_.has_begun() && !hidden_us_) lost_way_.Add(view);
   const int64_t max_unlocated_us = tracked_utime_us_ ? 0 : options_.max_unlocated_us;
@@ -434,6 +438,17 @@ bool MapTracker::NoteLoss(const Frame& view) {
     start_.Restart();
   }
   return true;
+}
+
+// Whether the camera stood still when it was seen last: then it is something else that moved.
+bool MapTracker::StoodStill() const {
+  const auto motion = motion_.Predict(kDriftInterval_s);
+  if (!motion || !motion->is_learned || motion->is_steady) return false;
+  const double depth = last_->frame.MedianDepth() / WorldFromReference().scale;
+  const double fx_px = last_->frame.view->calibration().fx_px;
+  const double turn = LogSO3(motion->last_from_current.rotation).norm();
+  return fx_px * motion->last_from_current.translation.norm() < kMaxStanding_px * depth &&
+         fx_px * turn < kMaxStanding_px;
 }
 
 void MapTracker::BeginLostWay() {

@@ -121,6 +121,7 @@ class MapTracker {
   bool StartFromDepth(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool StartFromPair(const Frame& view, std::vector<KeyframeObservation>& keyframes);
   bool NoteLoss(const Frame& view);
+  bool StoodStill() const;
   void BeginLostWay();
   void ForgetMotion();
 
