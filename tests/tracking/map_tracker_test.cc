@@ -379,5 +379,83 @@ TEST_F(LateAnswer, IsTakenWhereTheOldPlaceIsStillThere) {
   EXPECT_TRUE(tracker_.Track(Take(30), &answer_).pose.is_relocalized);
 }
 
+// A camera that drives, stops and stands in front of what `hide` makes of each picture from then on.
+std::vector<PoseEstimate> Stand(SensorType sensor, const std::function<void(int64_t since_stop, FeatureFrame&)>& hide) {
+  constexpr int64_t kStop = 20, kEnd = 50;
+  SyntheticWorld world(sensor, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  Mapper mapper{MapperOptions{}};
+  std::vector<PoseEstimate> poses;
+  for (int64_t frame = 0; frame < kEnd; ++frame) {
+    // From half a meter a frame to none within five frames.
+    const double braking = std::clamp(static_cast<double>(frame - kStop) / 5.0, 0.0, 1.0);
+    const double at = std::min<double>(frame, kStop) + 5.0 * (braking - 0.5 * braking * braking);
+    FeatureFrame features = world.Take(frame, world.Pose(at)).features;
+    if (frame >= kStop + 10) hide(frame - kStop - 10, features);
+    const MapTrackingResult result = tracker.Track(features);
+    poses.push_back(result.pose);
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      EXPECT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+    }
+  }
+  return poses;
+}
+
+// Replaces what stands in the image left of `border_px` by points of another world, that moves to the right by half a
+// meter a frame.
+void PassBus(int64_t since, float border_px, FeatureFrame& features) {
+  SyntheticWorld other(features.calibration.sensor, 0.3);
+  const Rigid3 other_from_camera =
+      other.Pose(2.0) * Rigid3{Eigen::Quaterniond::Identity(), {-0.5 * static_cast<double>(since), 0.0, 0.0}};
+  FeatureFrame bus = other.Take(features.frame.value, other_from_camera).features;
+  Scramble(bus, [](size_t /*keypoint*/) { return false; });
+  FeatureFrame both = features;
+  both.keypoints.clear();
+  both.descriptors.clear();
+  const auto add = [&](const FeatureFrame& from, bool is_left) {
+    for (size_t i = 0; i < from.keypoints.size(); ++i) {
+      if ((from.keypoints[i].x_px < border_px) != is_left) continue;
+      both.keypoints.push_back(from.keypoints[i]);
+      both.descriptors.push_back(from.descriptors[i]);
+    }
+  };
+  add(features, false);
+  add(bus, true);
+  features = std::move(both);
+}
+
+TEST(MapTracker, IsNotCarriedAwayByWhatFillsTheImageAndMoves) {
+  for (const SensorType sensor : {SensorType::kStereo, SensorType::kMono}) {
+    const std::vector<PoseEstimate> poses = Stand(sensor, [](int64_t since, FeatureFrame& features) {
+      const auto width_px = static_cast<float>(features.calibration.width_px);
+      // It comes in from the left, fills the image, and has gone after 1.4 s.
+      const float share = since < 4 ? 0.25F * static_cast<float>(since + 1) : 1.0F;
+      if (since < 14) PassBus(since, share * width_px, features);
+    });
+    const Eigen::Vector3d standing_at = poses[29].world_from_camera.translation;
+    const double way = standing_at.norm();
+    int num_hidden = 0;
+    for (size_t i = 30; i < poses.size(); ++i) {
+      if (poses[i].state != TrackingState::kTracked) {
+        ++num_hidden;
+        continue;
+      }
+      EXPECT_LT((poses[i].world_from_camera.translation - standing_at).norm(), 0.01 * way) << i;
+    }
+    EXPECT_GE(num_hidden, 5);
+    EXPECT_EQ(poses.back().state, TrackingState::kTracked);
+    EXPECT_EQ(poses[46].state, TrackingState::kTracked) << "soon after the scene is back";
+  }
+}
+
+TEST(MapTracker, WhatHidesTheSceneForLongIsTheScene) {
+  const std::vector<PoseEstimate> poses = Stand(SensorType::kStereo, [](int64_t since, FeatureFrame& features) {
+    features.utime_us += since > 5 ? 12'000'000 : 0;
+    PassBus(0, static_cast<float>(features.calibration.width_px), features);
+  });
+  EXPECT_EQ(poses[31].state, TrackingState::kLost);
+  EXPECT_EQ(poses.back().state, TrackingState::kTracked) << "a new part";
+}
+
 }  // namespace
 }  // namespace tessera
