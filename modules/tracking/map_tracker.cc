@@ -16,17 +16,12 @@
 namespace tessera {
 namespace {
 
-constexpr double kMinCoverage = 0.4;  // see Coverage(): of a pose that no try has found clearly
-constexpr double kLongLost_s = 2.0;   // since the last pose: the camera may be where nothing is known of
-// Confirmed points that say whether a pose is that of the scene: so many, and this share agrees with it.
-constexpr int kTellingConfirmed = 8;
-constexpr double kMinConfirmedShare = 0.3, kSureConfirmedShare = 0.8;
-constexpr double kMaxStanding_px = 3.0;          // in kDriftInterval_s, as noise has it
-constexpr double kMinJump_px = 10.0;             // in the image
-constexpr int64_t kHiddenWithin_us = 1'000'000;  // since such points agreed last
-constexpr int64_t kMaxHidden_us = 10'000'000;    // longer, what hides the scene is the scene
-constexpr int64_t kHiddenAgain_us = 1'000'000;   // in that time, what hid the scene may do so once more
-constexpr int kFewInliers = 100;                 // that agree with a pose: what two frames as such show counts more
+constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
+constexpr double kLongLost_s = 2.0;      // since the last pose: the camera may be where nothing is known of
+constexpr double kMaxStanding_px = 3.0;  // in kDriftInterval_s, as noise has it
+constexpr double kExact = 1e12;          // information about a pose that is taken as it is
+constexpr double kMinJump_px = 10.0;     // in the image
+constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
 constexpr double kDriftInterval_s = 0.1;
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // What a camera that stood goes until the next frame, in the image: a standard deviation.
@@ -99,7 +94,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   std::optional<FrameSearch> search;
   if (last_ && !is_localized) {
     search.emplace(times_.AtOneTime(captured, last_->frame), last_->frame, Expect(*view), replica_, options_.search,
-                   hidden_us_.has_value());
+                   scene_.is_hidden());
   }
   if (is_localized || (search && Localize(captured, *search))) {
     CountPoints(result.pose);
@@ -109,7 +104,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
       if (view->baseline_m() == 0.0) WatchScale();
       result.keyframes.push_back(MakeKeyframe(*last_));
     }
-  } else if (before == State::kTracking && !hidden_us_ && search && FollowPair(*search, result.keyframes)) {
+  } else if (before == State::kTracking && !scene_.is_hidden() && search && FollowPair(*search, result.keyframes)) {
     result.pose.state = TrackingState::kTracked;
   } else if (may_ask && CanAskFor(*view)) {
     asked_ = view;
@@ -176,7 +171,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   MatchLocal(LocalPoints(replica_, frame, options_.search.max_local_keyframes),
              options_.search.matching.local_radius_px, options_.search.matching, frame);
   if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
-  if (hidden_us_ && NumConfirmed(replica_, frame) < kMinConfirmed) return false;
+  if (scene_.is_hidden() && NumConfirmed(replica_, frame) < kMinConfirmed) return false;
   if (!reference_.id.valid() || replica_.PartOf(reference_.id) != replica_.PartOf(answer.reference)) {
     ground_.ForgetHeight();
   }
@@ -187,7 +182,7 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   decision_.Restart(frame);
   const Rigid3 reference_from_camera = (world_from_reference->Inverse() * frame.world_from_camera).Pose();
   ForgetMotion();
-  hidden_us_.reset();
+  scene_.EndHiding();
   last_.emplace(std::move(frame), reference_from_camera);
   return true;
 }
@@ -243,14 +238,16 @@ bool MapTracker::Localize(const CapturedFrame& captured, FrameSearch& search) {
   const int num_matches = frame.NumPoints();
   const StepPose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < MinInliers(num_matches)) return false;
-  if (HidesScene(frame, pose)) {
-    hidden_us_ = frame.view->features().utime_us;
+  const int64_t utime_us = frame.view->features().utime_us;
+  const auto jumps = [&] { return Jumps(*frame.view, frame.world_from_camera, pose.optimized.information); };
+  if (IsFollowed() && scene_.IsBehind(pose, utime_us, jumps)) {
+    scene_.Hide(utime_us);
     return false;
   }
   // Soon after a loss the greater number of inliers says as much.
   const bool is_doubtful =
       lost_since_us_ ? SecondsBetween(*last_->frame.view, *frame.view) > kLongLost_s : found->is_doubtful;
-  if (is_doubtful && !IsConfirmed(frame, pose) && Coverage(around, frame) < kMinCoverage) return false;
+  if (is_doubtful && !scene_.IsSure(pose, utime_us, jumps) && Coverage(around, frame) < kMinCoverage) return false;
   const bool are_few = pose.optimized.num_inliers < kFewInliers;
   if (!lost_since_us_ && are_few && search.PairContradicts(frame.world_from_camera)) return false;
   const int num_outliers = num_matches - frame.NumPoints();
@@ -258,32 +255,11 @@ bool MapTracker::Localize(const CapturedFrame& captured, FrameSearch& search) {
   return true;
 }
 
-// Whether confirmed points leave no doubt of a pose, however much of the scene is hidden.
-bool MapTracker::IsConfirmed(const TrackedFrame& frame, const StepPose& pose) const {
-  return pose.num_confirmed >= kMinConfirmed && pose.num_confirmed > kSureConfirmedShare * pose.num_confirmed_matches &&
-         WasConfirmedBefore(*frame.view) && !Jumps(*frame.view, frame.world_from_camera, pose.optimized.information);
-}
-
 // Points that the last frame saw for the first time are no measure: they may be on something that moves.
 int MapTracker::MinInliers(int num_matches) const {
   if (lost_since_us_) return options_.min_relocalized_inliers;
   const int num_last = last_->num_known > 0 ? std::max(last_->num_known, num_matches) : last_->frame.NumPoints();
   return std::max(options_.min_inliers, static_cast<int>(options_.min_share_of_last * num_last));
-}
-
-// Whether the frame's pose is that of a body which moves in front of the camera. A bus or a person that passes close by
-// fills the image, and agrees with itself. But the confirmed points that were in view a moment ago contradict the pose,
-// or are gone, and the camera would have jumped. Then only they tell when the scene is back.
-bool MapTracker::HidesScene(const TrackedFrame& frame, const StepPose& pose) const {
-  const auto jumps = [&] { return Jumps(*frame.view, frame.world_from_camera, pose.optimized.information); };
-  if (hidden_us_) return pose.num_confirmed < kMinConfirmed || jumps();
-  if (lost_since_us_ || !WasConfirmedBefore(*frame.view)) return false;
-  if (pose.num_confirmed_matches < kTellingConfirmed) return jumps();
-  return pose.num_confirmed < kMinConfirmedShare * pose.num_confirmed_matches;
-}
-
-bool MapTracker::WasConfirmedBefore(const FrameView& view) const {
-  return confirmed_us_ && view.features().utime_us - *confirmed_us_ <= kHiddenWithin_us;
 }
 
 // Whether a camera that turned so can't have come here by how it moved a moment ago. `information`: about the pose.
@@ -306,7 +282,7 @@ StepPose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
 // From the last frame; nullopt: it isn't one that followed it.
 std::optional<CaptureTimes::Step> MapTracker::StepTo(const TrackedFrame& frame) const {
   const double interval_s = SecondsBetween(*last_->frame.view, *frame.view);
-  if ((lost_since_us_ && !hidden_us_) || interval_s <= 0.0) return std::nullopt;
+  if (!IsFollowed() || interval_s <= 0.0) return std::nullopt;
   return CaptureTimes::Step{last_->frame.world_from_camera.Inverse() * frame.world_from_camera, interval_s};
 }
 
@@ -328,8 +304,7 @@ void MapTracker::Remember(TrackedFrame frame, const StepPose& pose, bool is_wide
   times_.Follow(step);
   if (replica_.WorldFromKeyframe(reference_.id)) times_.Learn(frame, world_from_reference.Pose());
   lost_since_us_.reset();
-  if (hidden_us_ && frame.view->features().utime_us - *hidden_us_ > kHiddenAgain_us) hidden_us_.reset();
-  if (pose.num_confirmed >= kTellingConfirmed) confirmed_us_ = frame.view->features().utime_us;
+  scene_.See(pose, frame.view->features().utime_us);
   const int num_known = frame.NumPoints();
   std::optional<PoseInfluences> influences = InfluencesOn(frame);
   std::optional<Matrix6d> way_covariance;
@@ -344,8 +319,9 @@ bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation
   if (!options_.makes_keyframes) return false;
   const std::optional<Rigid3> world_from_camera = search.PoseByPair();
   if (!world_from_camera) return false;
-  if (WasConfirmedBefore(*search.view()) && Jumps(*search.view(), *world_from_camera, 1e12 * Matrix6d::Identity())) {
-    hidden_us_ = search.view()->features().utime_us;
+  const int64_t utime_us = search.view()->features().utime_us;
+  if (scene_.WasConfirmed(utime_us) && Jumps(*search.view(), *world_from_camera, kExact * Matrix6d::Identity())) {
+    scene_.Hide(utime_us);
     return false;
   }
   const double interval_s = SecondsBetween(*last_->frame.view, *search.view());
@@ -372,7 +348,7 @@ bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation
 
 bool MapTracker::Start(const Frame& view, std::vector<KeyframeObservation>& keyframes) {
   ForgetMotion();
-  hidden_us_.reset();
+  scene_.EndHiding();
   return view->baseline_m() > 0.0 ? StartFromDepth(view, keyframes) : StartFromPair(view, keyframes);
 }
 
@@ -424,13 +400,13 @@ bool MapTracker::NoteLoss(const Frame& view) {
   const int64_t utime_us = view->features().utime_us;
   if (!lost_since_us_) {
     lost_since_us_ = utime_us;
-    if (last_ && StoodStill()) hidden_us_ = utime_us;
+    if (last_ && StoodStill()) scene_.Hide(utime_us);
   }
   if (last_ && !lost_way_.has_begun()) BeginLostWay();
-  if (lost_way_.has_begun() && !hidden_us_) lost_way_.Add(view);
+  if (lost_way_.has_begun() && !scene_.is_hidden()) lost_way_.Add(view);
   const int64_t max_unlocated_us = tracked_utime_us_ ? 0 : options_.max_unlocated_us;
-  if (hidden_us_) hidden_us_ = utime_us;
-  const int64_t max_hidden_us = hidden_us_ ? kMaxHidden_us : 0;
+  if (scene_.is_hidden()) scene_.Hide(utime_us);
+  const int64_t max_hidden_us = scene_.is_hidden() ? HiddenScene::kMaxHidden_us : 0;
   const int64_t max_lost_us = std::max({options_.max_lost_us, max_unlocated_us, max_hidden_us});
   if (utime_us - *lost_since_us_ <= max_lost_us || !options_.makes_keyframes) return false;
   if (last_) {

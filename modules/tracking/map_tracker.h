@@ -20,6 +20,7 @@
 #include "tracking/capture_times.h"
 #include "tracking/frame_search.h"
 #include "tracking/ground_watch.h"
+#include "tracking/hidden_scene.h"
 #include "tracking/initializer.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/localized_frame.h"
@@ -109,9 +110,8 @@ class MapTracker {
   bool Localize(const CapturedFrame& captured, FrameSearch& search);
   StepPose OptimizeWithMotion(TrackedFrame& frame) const;
   int MinInliers(int num_matches) const;
-  bool HidesScene(const TrackedFrame& frame, const StepPose& pose) const;
-  bool IsConfirmed(const TrackedFrame& frame, const StepPose& pose) const;
-  bool WasConfirmedBefore(const FrameView& view) const;
+  // The motion of a moment ago still says where the camera may be.
+  bool IsFollowed() const { return !lost_since_us_ || scene_.is_hidden(); }
   bool Jumps(const FrameView& view, const Rigid3& world_from_camera, const Matrix6d& information) const;
   std::optional<CaptureTimes::Step> StepTo(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame, const StepPose& pose, bool is_wide_step, int num_outliers);
@@ -152,10 +152,9 @@ class MapTracker {
   int64_t previous_utime_us_ = 0;            // of the frame before
   std::optional<int64_t> tracked_utime_us_;  // of the last frame with a pose
   std::optional<int64_t> lost_since_us_;
-  std::optional<int64_t> confirmed_us_;  // of the last frame whose pose confirmed points agreed with
-  std::optional<int64_t> hidden_us_;     // when something that moves hid the scene; nullopt: not lately
-  LostWay lost_way_;                     // since the last frame with a pose
-  Frame asked_;                          // the frame that asked last
+  HiddenScene scene_;
+  LostWay lost_way_;  // since the last frame with a pose
+  Frame asked_;       // the frame that asked last
 };
 
 }  // namespace tessera

@@ -389,7 +389,7 @@ std::vector<PoseEstimate> Stand(SensorType sensor, const std::function<void(int6
   for (int64_t frame = 0; frame < kEnd; ++frame) {
     // From half a meter a frame to none within five frames.
     const double braking = std::clamp(static_cast<double>(frame - kStop) / 5.0, 0.0, 1.0);
-    const double at = std::min<double>(frame, kStop) + 5.0 * (braking - 0.5 * braking * braking);
+    const double at = static_cast<double>(std::min(frame, kStop)) + 5.0 * (braking - 0.5 * braking * braking);
     FeatureFrame features = world.Take(frame, world.Pose(at)).features;
     if (frame >= kStop + 10) hide(frame - kStop - 10, features);
     const MapTrackingResult result = tracker.Track(features);

@@ -1,0 +1,69 @@
+// A body that moves in front of the scene, told by the points that stood still before.
+#include "tracking/hidden_scene.h"
+
+#include <gtest/gtest.h>
+
+namespace tessera {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;
+
+StepPose PoseWith(int num_confirmed, int num_confirmed_matches) {
+  StepPose pose;
+  pose.num_confirmed = num_confirmed;
+  pose.num_confirmed_matches = num_confirmed_matches;
+  return pose;
+}
+bool Jumps() { return true; }
+bool GoesOn() { return false; }
+
+class HiddenSceneTest : public testing::Test {
+ protected:
+  HiddenSceneTest() { scene_.See(PoseWith(100, 110), kSecond); }
+  HiddenScene scene_;
+};
+
+TEST_F(HiddenSceneTest, ConfirmedPointsThatContradictAPoseHideIt) {
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(5, 20), kSecond, GoesOn));
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(8, 20), kSecond, Jumps)) << "a jerk, on which they agree";
+}
+
+TEST_F(HiddenSceneTest, WhereTheyAreGoneAJumpHidesIt) {
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(2, 2), kSecond, Jumps));
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(2, 2), kSecond, GoesOn)) << "a turn into what is new";
+}
+
+TEST_F(HiddenSceneTest, WithoutConfirmedPointsAMomentAgoNothingIsSaid) {
+  EXPECT_FALSE(HiddenScene().IsBehind(PoseWith(0, 0), kSecond, Jumps)) << "a map that has just begun";
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(0, 0), 3 * kSecond, Jumps));
+}
+
+TEST_F(HiddenSceneTest, IsBackWhenManyConfirmedPointsAgreeAndTheCameraIsWhereItWas) {
+  scene_.Hide(2 * kSecond);
+  ASSERT_TRUE(scene_.is_hidden());
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 20), 4 * kSecond, GoesOn));
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(40, 45), 4 * kSecond, Jumps));
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(40, 45), 4 * kSecond, GoesOn));
+}
+
+TEST_F(HiddenSceneTest, MayBeHiddenAgainForASecond) {
+  scene_.Hide(2 * kSecond);
+  scene_.See(PoseWith(40, 45), 2 * kSecond + kSecond / 2);
+  EXPECT_TRUE(scene_.is_hidden());
+  scene_.See(PoseWith(40, 45), 2 * kSecond + 2 * kSecond);
+  EXPECT_FALSE(scene_.is_hidden());
+  scene_.Hide(5 * kSecond);
+  scene_.EndHiding();
+  EXPECT_FALSE(scene_.is_hidden());
+}
+
+TEST_F(HiddenSceneTest, MostOfManyConfirmedPointsLeaveNoDoubt) {
+  EXPECT_TRUE(scene_.IsSure(PoseWith(30, 33), kSecond, GoesOn));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 33), kSecond, Jumps));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 60), kSecond, GoesOn));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(20, 20), kSecond, GoesOn));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 33), 3 * kSecond, GoesOn));
+}
+
+}  // namespace
+}  // namespace tessera
