@@ -5,10 +5,11 @@
 namespace tessera {
 namespace {
 
-// Fewer confirmed points say nothing of a pose. In worlds and recordings in which nothing moves, at least four in ten
-// of more agree.
-constexpr int kTelling = 8;
-constexpr double kMinShare = 0.3, kSureShare = 0.8;
+constexpr int kTelling = 8;  // fewer confirmed points say nothing of a pose
+// Of the confirmed points that were matched, those that agree (where nothing moves, at least four in ten). And of their
+// share of all points that agree, what is left after a jump.
+constexpr double kMinShare = 0.3;
+constexpr double kSureShare = 0.8;
 constexpr int64_t kMoment_us = 1'000'000;
 
 }  // namespace
@@ -20,8 +21,10 @@ bool HiddenScene::WasConfirmed(int64_t utime_us) const {
 bool HiddenScene::IsBehind(const StepPose& pose, int64_t utime_us, const std::function<bool()>& jumps) const {
   if (is_hidden()) return pose.num_confirmed < kMinConfirmed || jumps();
   if (!WasConfirmed(utime_us)) return false;
-  if (pose.num_confirmed_matches < kTelling) return jumps();
-  return pose.num_confirmed < kMinShare * pose.num_confirmed_matches;
+  const bool contradicts =
+      pose.num_confirmed_matches >= kTelling && pose.num_confirmed < kMinShare * pose.num_confirmed_matches;
+  const bool are_gone = pose.num_confirmed < kMinShare * confirmed_share_ * pose.optimized.num_inliers;
+  return contradicts || (are_gone && jumps());
 }
 
 bool HiddenScene::IsSure(const StepPose& pose, int64_t utime_us, const std::function<bool()>& jumps) const {
@@ -31,7 +34,9 @@ bool HiddenScene::IsSure(const StepPose& pose, int64_t utime_us, const std::func
 
 void HiddenScene::See(const StepPose& pose, int64_t utime_us) {
   if (hidden_us_ && utime_us - *hidden_us_ > kMoment_us) hidden_us_.reset();
-  if (pose.num_confirmed >= kTelling) confirmed_us_ = utime_us;
+  if (pose.num_confirmed < kTelling) return;
+  confirmed_us_ = utime_us;
+  confirmed_share_ = static_cast<double>(pose.num_confirmed) / pose.optimized.num_inliers;
 }
 
 }  // namespace tessera

@@ -38,6 +38,7 @@ class HiddenScene {
 
  private:
   std::optional<int64_t> confirmed_us_;  // of the last frame whose pose confirmed points agreed with
+  double confirmed_share_ = 0.0;         // of the points that did
   std::optional<int64_t> hidden_us_;     // of the last frame that didn't show the scene
 };
 

@@ -8,8 +8,10 @@ namespace {
 
 constexpr int64_t kSecond = 1'000'000;
 
+// On which 200 points agree.
 StepPose PoseWith(int num_confirmed, int num_confirmed_matches) {
   StepPose pose;
+  pose.optimized.num_inliers = 200;
   pose.num_confirmed = num_confirmed;
   pose.num_confirmed_matches = num_confirmed_matches;
   return pose;
@@ -25,11 +27,12 @@ class HiddenSceneTest : public testing::Test {
 
 TEST_F(HiddenSceneTest, ConfirmedPointsThatContradictAPoseHideIt) {
   EXPECT_TRUE(scene_.IsBehind(PoseWith(5, 20), kSecond, GoesOn));
-  EXPECT_FALSE(scene_.IsBehind(PoseWith(8, 20), kSecond, Jumps)) << "a jerk, on which they agree";
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(40, 100), kSecond, Jumps)) << "a jerk, on which they agree";
 }
 
 TEST_F(HiddenSceneTest, WhereTheyAreGoneAJumpHidesIt) {
   EXPECT_TRUE(scene_.IsBehind(PoseWith(2, 2), kSecond, Jumps));
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 25), kSecond, Jumps)) << "few of many points, where they were the half";
   EXPECT_FALSE(scene_.IsBehind(PoseWith(2, 2), kSecond, GoesOn)) << "a turn into what is new";
 }
 
