@@ -171,7 +171,9 @@ bool MapTracker::TakeAnswer(const RelocalizationAnswer& answer, const Frame& vie
   MatchLocal(LocalPoints(replica_, frame, options_.search.max_local_keyframes),
              options_.search.matching.local_radius_px, options_.search.matching, frame);
   if (OptimizeFrame(options_.search.pose, frame) < options_.min_relocalized_inliers) return false;
-  if (scene_.is_hidden() && NumConfirmed(replica_, frame) < kMinConfirmed) return false;
+  // What hides the scene is in the map by now, too, but not for long.
+  const int num_needed = std::max(kMinConfirmed, frame.NumPoints() / 2);
+  if (scene_.is_hidden() && NumConfirmed(replica_, frame) < num_needed) return false;
   if (!reference_.id.valid() || replica_.PartOf(reference_.id) != replica_.PartOf(answer.reference)) {
     ground_.ForgetHeight();
   }
