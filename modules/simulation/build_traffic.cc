@@ -1,7 +1,6 @@
 // Vehicles that take much of the image, and move.
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "simulation/random.h"
 #include "simulation/world.h"
@@ -30,7 +29,7 @@ class TrafficBuilder {
   // One behind the other on the right lane, until the wait is over.
   void Cross(const Polyline& middle, const Stop& stop, double begin_s) {
     const Polyline lane = Resample(Shift(Resample(middle, kCarStepM), kLaneM), kCarStepM);
-    const Eigen::Vector2d eye = PointAlong(plan_.drive, stop.at_m);
+    const Eigen::Vector2d eye = Shorten(plan_.drive, stop.at_m).back();
     const auto nearest = std::min_element(lane.begin(), lane.end(), [&](const auto& a, const auto& b) {
       return (a - eye).squaredNorm() < (b - eye).squaredNorm();
     });
@@ -41,8 +40,8 @@ class TrafficBuilder {
       MovingCar car;
       car.way = lane;
       car.position_m = [=](double time_s) { return passes_m + speed_mps * (time_s - passes_s); };
-      car.body =
-          random_.Chance(0.6) ? BuildBox(random_.Uniform(6.0, 12.0)) : BuildCar(kOrigin, kAhead, Seed(), builder_);
+      car.body = random_.Chance(0.6) ? BuildBox(random_.Uniform(6.0, 12.0))
+                                     : BuildCar(kOrigin, kAhead, random_.Next(), builder_);
       world_.cars.push_back(std::move(car));
     }
   }
@@ -71,16 +70,11 @@ class TrafficBuilder {
     // Windows, a plain side, or advertisements.
     constexpr std::array kSides{Material::kFacade, Material::kCarSide, Material::kSign};
     const Material side = kSides[static_cast<size_t>(random_.Index(kSides.size()))];
-    const uint32_t seed = Seed();
+    const uint32_t seed = random_.Next();
     const int32_t sides = builder_.AddPaint({side, seed, length_m, height_m, 0.02});
     const int32_t ends = builder_.AddPaint({Material::kSign, seed + 1, 2.0 * kHalfWidthM, height_m, 0.02});
     return builder_.Box(kOrigin, kAhead, 0.5 * length_m, kHalfWidthM, 0.25, height_m, sides, ends);
   }
-
-  static Eigen::Vector2d PointAlong(const Polyline& line, double distance_m) {
-    return Shorten(line, std::max(distance_m, 1.0)).back();
-  }
-  uint32_t Seed() { return random_.Next(); }
 
   inline static const Eigen::Vector2d kOrigin{0.0, 0.0}, kAhead{0.0, 1.0};
 

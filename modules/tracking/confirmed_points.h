@@ -12,8 +12,8 @@ inline constexpr int kMinConfirmed = 25;
 
 struct PoseByConfirmed {
   PoseOptimizationResult optimized;
-  int num_confirmed = 0;  // points that were matched
-  int num_agreeing = 0;   // of these, with the pose
+  int num_confirmed_matches = 0;  // of the points that the frame saw
+  int num_confirmed = 0;          // of these, with which the pose agrees
 };
 
 // The frame takes the pose by all points that it sees, and loses the outliers (PoseByPoints, TakePose), unless those
@@ -24,8 +24,9 @@ struct PoseByConfirmed {
 PoseByConfirmed OptimizeByConfirmed(const MapReplica& replica, const PoseOptimizationOptions& options,
                                     const PosePrior* prior, TrackedFrame& frame);
 
-// How many of the points that the frame sees are.
+// How many of the points that the frame sees are confirmed.
 int NumConfirmed(const MapReplica& replica, const TrackedFrame& frame);
+// Those of the points that are.
 KnownPoints OnlyConfirmed(const MapReplica& replica, KnownPoints points);
 
 }  // namespace tessera

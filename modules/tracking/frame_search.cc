@@ -116,9 +116,9 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   const PoseByConfirmed pose = OptimizeByConfirmed(replica_, options_.pose, prior, frame);
   const int num_inliers = pose.optimized.num_inliers;
   const Rigid3 found = frame.world_from_camera;
-  if (IsBetter(num_inliers, pose.num_agreeing, best)) {
+  if (IsBetter(num_inliers, pose.num_confirmed, best)) {
     best.num_inliers = num_inliers;
-    best.num_confirmed = pose.num_agreeing;
+    best.num_confirmed = pose.num_confirmed;
     best.frame = std::move(frame);
   }
   if (num_inliers < options_.min_last_matches / 2) return false;

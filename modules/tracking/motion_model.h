@@ -81,8 +81,7 @@ enum class StepEvidence {
 };
 
 // `by_images` and `covariance`: the motion (last_from_current) and its translation's covariance by images alone. A
-// contradiction is a jump that changes the length along the
-// prediction by a third at least.
+// contradiction is a jump that changes the length along the prediction by a third at least.
 StepEvidence Judge(const MotionPrediction& prediction, const Rigid3& by_images, const Eigen::Matrix3d& covariance);
 
 }  // namespace tessera

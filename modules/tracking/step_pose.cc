@@ -25,7 +25,7 @@ struct Optimized {
 Optimized Optimize(const MapReplica& replica, const PoseOptimizationOptions& options, const PosePrior* prior,
                    TrackedFrame frame) {
   PoseByConfirmed pose = OptimizeByConfirmed(replica, options, prior, frame);
-  return {std::move(pose.optimized), pose.num_confirmed, pose.num_agreeing, std::move(frame)};
+  return {std::move(pose.optimized), pose.num_confirmed_matches, pose.num_confirmed, std::move(frame)};
 }
 
 // Points beside one another err alike, which no covariance knows of: a thousand of them on one wall seem to fix how the
@@ -67,7 +67,7 @@ StepPose OptimizeStep(const MapReplica& replica, const PoseOptimizationOptions& 
                       TrackedFrame& frame) {
   if (expected == nullptr) {
     PoseByConfirmed pose = OptimizeByConfirmed(replica, options, nullptr, frame);
-    return {std::move(pose.optimized), pose.num_confirmed, pose.num_agreeing};
+    return {std::move(pose.optimized), pose.num_confirmed_matches, pose.num_confirmed};
   }
   const PosePrior prior = expected->Prior();
   Optimized with_motion = Optimize(replica, options, &prior, frame);
