@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <string_view>
 
 #include "simulation/random.h"
 
@@ -46,8 +48,10 @@ void EffectsPipeline::BlurMotion(const Rendering& rendering, const CameraVelocit
   for (int v = 0; v < camera_.height_px; ++v) {
     const float y = (static_cast<float>(v) - static_cast<float>(camera_.cy_px)) / fy;
     const float* inverse_depth = rendering.inverse_depth.row(v);
+    const uint8_t* is_body = rendering.body.empty() ? nullptr : rendering.body.row(v);
     uint16_t* out = blurred_.row(v);
     for (int u = 0; u < camera_.width_px; ++u) {
+      if (is_body != nullptr && is_body[u] != 0) continue;  // it moves with the camera
       const float x = (static_cast<float>(u) - static_cast<float>(camera_.cx_px)) / fx;
       const float w = inverse_depth[u];
       const float du = fx * ((-t.x() + x * t.z()) * w + x * y * o.x() - (1.0F + x * x) * o.y() + y * o.z());
@@ -134,6 +138,42 @@ DepthImage EffectsPipeline::Depth(const Rendering& rendering, uint32_t picture) 
     }
   }
   return depth;
+}
+
+void StampTime(double time_s, GrayImage& image) {
+  // Segments of a digit: top, upper left and right, middle, lower left and right, bottom.
+  constexpr std::array<std::string_view, 10> kSegments{"1110111", "0010010", "1011101", "1011011", "0111010",
+                                                       "1101011", "1101111", "1010010", "1111111", "1111011"};
+  const int pen = std::max(1, image.height / 200);
+  const int width = 6 * pen, height = 10 * pen;
+  const auto fill = [&](int x, int y, int dx, int dy, uint8_t gray) {
+    for (int v = std::max(0, y); v < std::min(image.height, y + dy); ++v) {
+      for (int u = std::max(0, x); u < std::min(image.width, x + dx); ++u) image.row(v)[u] = gray;
+    }
+  };
+  const auto seconds = static_cast<int>(time_s);
+  char text[32];
+  std::snprintf(text, sizeof text, "2026 11 28 12 %02d %02d 4711", seconds / 60 % 60, seconds % 60);
+  int x = 4 * pen;
+  const int y = 4 * pen;
+  for (const char* letter = text; *letter != 0; ++letter, x += width + 2 * pen) {
+    if (*letter == ' ') continue;
+    const std::string_view on = kSegments[static_cast<size_t>(*letter - '0')];
+    for (const int border : {pen, 0}) {
+      const uint8_t gray = border > 0 ? 20 : 245;
+      const auto bar = [&](size_t segment, int left, int top, int dx, int dy) {
+        if (on[segment] == '1') fill(x + left - border, y + top - border, dx + 2 * border, dy + 2 * border, gray);
+      };
+      const int middle = (height - pen) / 2;
+      bar(0, 0, 0, width - pen, pen);
+      bar(1, 0, 0, pen, middle + pen);
+      bar(2, width - 2 * pen, 0, pen, middle + pen);
+      bar(3, 0, middle, width - pen, pen);
+      bar(4, 0, middle, pen, height - middle);
+      bar(5, width - 2 * pen, middle, pen, height - middle);
+      bar(6, 0, height - pen, width - pen, pen);
+    }
+  }
 }
 
 }  // namespace tessera

@@ -48,4 +48,7 @@ class EffectsPipeline {
   Image<float> vignette_;  // factor by pixel
 };
 
+// Writes the time with a name in front into the image's upper left corner: white letters with a dark border.
+void StampTime(double time_s, GrayImage& image);
+
 }  // namespace tessera

@@ -280,10 +280,22 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& world_from
 
 void Renderer::Clear(const CameraCalibration& camera, Rendering& out) const {
   if (out.radiance.width != camera.width_px || out.radiance.height != camera.height_px) {
-    out = {RadianceImage(camera.width_px, camera.height_px), InverseDepthImage(camera.width_px, camera.height_px)};
+    out = {RadianceImage(camera.width_px, camera.height_px), InverseDepthImage(camera.width_px, camera.height_px),
+           GrayImage()};
   }
   std::fill(out.radiance.pixels.begin(), out.radiance.pixels.end(), kHorizonGray);
   std::fill(out.inverse_depth.pixels.begin(), out.inverse_depth.pixels.end(), 0.0F);
+}
+
+void Renderer::DrawBody(const CameraCalibration& camera, const Rigid3& body_from_camera, Rendering& out) {
+  if (world_->body.empty()) return;
+  Drawer drawer(camera, 0, camera.height_px, out);
+  const Rigid3 camera_from_body = body_from_camera.Inverse();
+  for (const Surface& surface : world_->body) {
+    drawer.Draw(InCamera(camera_from_body, surface), paints_.Get(surface.paint));
+  }
+  out.body = GrayImage(camera.width_px, camera.height_px);
+  for (size_t i = 0; i < out.body.pixels.size(); ++i) out.body.pixels[i] = out.inverse_depth.pixels[i] > 0.0F ? 1 : 0;
 }
 
 void Renderer::DrawRows(const CameraCalibration& camera, const Rigid3& world_from_camera, int first, int last,
@@ -297,15 +309,18 @@ void Renderer::DrawRows(const CameraCalibration& camera, const Rigid3& world_fro
   }
 }
 
-void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out) {
+void Renderer::Render(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s, Rendering& out,
+                      const Rigid3& body_from_camera) {
   Clear(camera, out);
+  DrawBody(camera, body_from_camera, out);
   Collect(camera, world_from_camera, time_s, 0.0);
   DrawRows(camera, world_from_camera, 0, camera.height_px, out);
 }
 
 void Renderer::RenderRolling(const CameraCalibration& camera, const std::function<Rigid3(double)>& world_from_camera,
-                             double time_s, Rendering& out) {
+                             double time_s, Rendering& out, const Rigid3& body_from_camera) {
   Clear(camera, out);
+  DrawBody(camera, body_from_camera, out);
   Collect(camera, world_from_camera(0.5 * (camera.height_px - 1)), time_s, 0.3 * camera.fx_px);
   for (int first = 0; first < camera.height_px; first += kBandRows) {
     const int last = std::min(first + kBandRows, camera.height_px);

@@ -42,6 +42,9 @@ const CameraModel& ModelOf(Scene scene) {
   }
 }
 
+// How far ahead of the camera stands what carries it, m.
+double ReachOf(Scene scene) { return &ModelOf(scene) == &kCarCamera ? 2.2 : 0.5; }
+
 CameraCalibration MakeCamera(const SimulationOptions& options, SensorType sensor) {
   const CameraModel& model = ModelOf(options.scene);
   const double s = options.scale;
@@ -96,7 +99,9 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
                                                {"scale", &options.scale},
                                                {"readout", &options.readout_ms},
                                                {"depth_delay", &options.depth_delay_ms},
-                                               {"stop", &options.stop_m}};
+                                               {"stop", &options.stop_m},
+                                               {"body", &options.body},
+                                               {"stamp", &options.stamp}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
@@ -104,7 +109,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
   } else {
     throw InputError("sim: `" + key + "=" + value +
                      "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-                     "depth_delay (ms), stop (m), speed, noise, scale or path");
+                     "depth_delay (ms), stop (m), body, stamp, speed, noise, scale or path");
   }
 }
 
@@ -122,6 +127,8 @@ Result<> SimulationOptions::Check() const {
   if (!(depth_delay_ms >= -100.0 && depth_delay_ms <= 100.0)) {
     return Failed("sim: depth_delay must be between -100 and 100 ms");
   }
+  if (!(body >= 0.0 && body <= 0.5)) return Failed("sim: body must be between 0 and 0.5 of the image's height");
+  if (!(stamp == 0.0 || stamp == 1.0)) return Failed("sim: stamp must be 0 or 1");
   if (!(stop_m >= 7.0 && stop_m <= 20.0)) return Failed("sim: stop must be between 7 and 20 m");
   return {};
 }
@@ -203,6 +210,7 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       break;
     }
   }
+  if (options.body > 0.0) AddBody(camera_, options.body, ReachOf(options.scene), options.seed, world);
   renderer_ = std::make_unique<Renderer>(std::make_shared<const World>(std::move(world)));
   num_frames_ = static_cast<int64_t>(trajectory_->duration_s() * frames_per_s_);
   effects_ = std::make_unique<EffectsPipeline>(camera_, MakeEffects(options), options.seed);
@@ -236,11 +244,11 @@ Rigid3 Simulation::WorldFromCameraAtRow(FrameId frame, double row) const {
 void Simulation::RenderEye(double time_s, double right_m, Rendering& out) {
   const Rigid3 left_from_eye{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}};
   if (readout_s_ == 0.0) {
-    renderer_->Render(camera_, trajectory_->WorldFromCamera(time_s) * left_from_eye, time_s, out);
+    renderer_->Render(camera_, trajectory_->WorldFromCamera(time_s) * left_from_eye, time_s, out, left_from_eye);
     return;
   }
   const auto world_from_eye = [&](double row) { return WorldFromCameraAt(time_s, row) * left_from_eye; };
-  renderer_->RenderRolling(camera_, world_from_eye, time_s, out);
+  renderer_->RenderRolling(camera_, world_from_eye, time_s, out, left_from_eye);
 }
 
 void Simulation::RenderPerfect(FrameId frame, Rendering& out) { RenderEye(TimeOf(frame), 0.0, out); }
@@ -255,6 +263,7 @@ CameraFrame Simulation::Render(FrameId id) {
   frame.sensor = camera_.sensor;
   RenderEye(time, 0.0, rendering_);
   frame.left = effects_->Apply(rendering_, velocity, time, picture);
+  if (options_.stamp > 0.0) StampTime(time, frame.left);
   if (camera_.sensor == SensorType::kRgbd) {
     if (options_.depth_delay_ms != 0.0) {
       RenderEye(time + 0.001 * options_.depth_delay_ms, 0.0, rendering_);
@@ -269,6 +278,7 @@ CameraFrame Simulation::Render(FrameId id) {
   } else if (camera_.sensor == SensorType::kStereo) {
     RenderEye(time, camera_.baseline_m, rendering_);
     frame.right = effects_->Apply(rendering_, velocity, time, picture + 1);
+    if (options_.stamp > 0.0) StampTime(time, frame.right);
   }
   return frame;
 }

@@ -25,6 +25,8 @@ struct SimulationOptions {
   double readout_ms = -1.0;     // rolling shutter: from the first row to the last; -1: that of the world's camera
   double depth_delay_ms = 0.0;  // RGB-D: depth is taken so much later than the image, as by a Kinect
   double stop_m = 12.0;         // traffic: it stops so far before the middle of a crossing
+  double body = 0.0;            // share of the image's height that shows the car or robot itself, at the bottom
+  double stamp = 0.0;           // 1: the time is written into the image, as dashcams do
   std::string path;             // a drive along the poses of a KITTI file instead of through the town
 
   // Fails if a value is out of range.

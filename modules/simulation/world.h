@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "geometry/camera.h"
 #include "simulation/drive.h"
 #include "simulation/paint.h"
 #include "simulation/random.h"
@@ -51,6 +52,7 @@ struct World {
   std::shared_ptr<const StreetMap> streets;  // null: a room
   double sight_m = 260.0;                    // surfaces whose center is farther are not drawn, but `far` ones are
   std::vector<Surface> far;                  // sky and skyline
+  std::vector<Surface> body;                 // what moves with the camera, in the left camera's frame
 };
 
 // The light on a surface with this unit normal: the sun from one side, the sky from above.
@@ -99,6 +101,9 @@ World BuildStreets(const StreetPlan& plan, uint32_t seed);
 // Besides, vehicles that cross in front of the waiting car, large ones among them, from both sides; and from 0.4 of the
 // way to 0.75 a lorry in front of it, that stops as it does and starts 1.5 s earlier.
 void AddTraffic(const StreetPlan& plan, const std::shared_ptr<const CarTrajectory>& drive, uint32_t seed, World& world);
+// What carries the camera and stands in its picture, over `share` of the height at the bottom and up to `reach_m`
+// ahead: a car's bonnet with stickers, vents and wipers, or a robot's top with what it bears.
+void AddBody(const CameraCalibration& camera, double share, double reach_m, uint32_t seed, World& world);
 // A furnished room with its middle at the origin; x, height, z.
 World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);
 // A desk at the origin, 0.72 m high, seen from where z is negative; a room around it.

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/errors.h"
@@ -138,6 +139,61 @@ TEST(Simulation, DepthAndPoseExplainTheNextImage) {
       EXPECT_GT(share, 0.5) << scene.name << " " << number;
     }
   }
+}
+
+// What carries the camera stays where it is in the picture, near, and sharp however the camera moves; above it, the
+// world is as it was.
+TEST(Simulation, TheCamerasOwnBodyStaysWhereItIs) {
+  Simulation without(Small("robot,noise=0"), SensorType::kRgbd);
+  Simulation simulation(Small("robot,noise=0,body=0.2"), SensorType::kRgbd);
+  const CameraFrame early = simulation.Render(FrameId{30}), late = simulation.Render(FrameId{225});
+  const CameraFrame bare = without.Render(FrameId{225});
+  const int border = static_cast<int>(0.8 * late.left.height) + 1;
+  int num = 0, num_same = 0, num_changed = 0;
+  for (int y = 0; y < late.left.height; ++y) {
+    for (int x = 0; x < late.left.width; ++x) {
+      const bool is_near = late.depth.row(y)[x] < 800;  // mm
+      if (y < border - late.left.height / 8) {
+        EXPECT_EQ(late.left.row(y)[x], bare.left.row(y)[x]);
+      } else if (y > border && is_near) {
+        ++num;
+        num_same += early.depth.row(y)[x] == late.depth.row(y)[x] ? 1 : 0;
+        num_changed += bare.left.row(y)[x] != late.left.row(y)[x] ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(num, late.left.width * late.left.height / 10);
+  EXPECT_EQ(num_same, num);
+  EXPECT_GT(num_changed, num / 2);
+}
+
+TEST(Simulation, StereoSeesTheBodyFromBothEyes) {
+  Simulation simulation(Small("street-short,body=0.2,noise=0"), SensorType::kStereo);
+  const CameraFrame frame = simulation.Render(FrameId{20});
+  Simulation bare(Small("street-short,noise=0"), SensorType::kStereo);
+  const CameraFrame other = bare.Render(FrameId{20});
+  const int row = frame.left.height - 3;
+  const auto differ = [row](const GrayImage& a, const GrayImage& b) {
+    return std::mismatch(a.row(row), a.row(row) + a.width, b.row(row)).first != a.row(row) + a.width;
+  };
+  EXPECT_TRUE(differ(frame.left, other.left));
+  EXPECT_TRUE(differ(frame.right, other.right));
+  EXPECT_TRUE(differ(frame.left, frame.right));
+}
+
+TEST(Simulation, TheTimeIsStampedIntoTheUpperLeftCorner) {
+  Simulation bare(Small("room"), SensorType::kMono), stamped(Small("room,stamp=1"), SensorType::kMono);
+  const GrayImage without = bare.Render(FrameId{5}).left, with = stamped.Render(FrameId{5}).left;
+  const GrayImage later = stamped.Render(FrameId{40}).left;
+  int num_white = 0, num_below = 0;
+  for (int y = 0; y < with.height; ++y) {
+    for (int x = 0; x < with.width; ++x) {
+      num_white += with.row(y)[x] == 245 && later.row(y)[x] == 245 ? 1 : 0;
+      num_below += y > with.height / 4 && with.row(y)[x] != without.row(y)[x] ? 1 : 0;
+    }
+  }
+  EXPECT_GT(num_white, 100) << "the date";
+  EXPECT_EQ(num_below, 0);
 }
 
 TEST(Simulation, NoiseIsAsOrdered) {
