@@ -13,6 +13,8 @@ constexpr double kVoxelsPerRange = 160.0;
 
 Result<> OccupancyOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(Require(resolution > 0.0, "the resolution must be positive"));
+  TESSERA_RETURN_IF_FAILED(
+      Require(min_range >= 0.0 && min_range < max_range, "the minimum range is not below the maximum"));
   TESSERA_RETURN_IF_FAILED(Require(max_range >= 2.0 * resolution, "the maximum range is below two voxels"));
   TESSERA_RETURN_IF_FAILED(
       Require(max_range <= kMaxVoxelsPerRay * resolution, "the maximum range is above 10,000 voxels"));

@@ -9,6 +9,7 @@ namespace tessera {
 struct OccupancyOptions {
   double resolution = 0.0;  // edge of a voxel, m (mono: units of the map); 0: see FitToSensor
   double max_range = 0.0;   // rays end here at the latest, in the same unit; 0: likewise
+  double min_range = 0.0;   // what is nearer is of the robot that carries the camera, and is left out
   double prob_hit = 0.7;    // that a voxel is occupied, by one scan that has a point in it
   double prob_miss = 0.4;   // likewise, by one scan whose rays go through it
   double prob_min = 0.12;   // what the octree says of a voxel stays between these

@@ -21,6 +21,7 @@ std::vector<RayCaster::End> RayCaster::CollectEnds(const Scan& scan, const Rigid
   for (const ScanPoint& point : PointsOf(scan)) {
     if (point.in_camera.z() <= 0.0) continue;
     const double range = point.in_camera.norm();
+    if (range < min_range_) continue;
     const bool is_within = range <= max_range_;
     const double share = is_within ? 1.0 : max_range_ / range;
     const Eigen::Vector3d in_world = rotation * (share * point.in_camera) + world_from_camera.translation;

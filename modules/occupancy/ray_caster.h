@@ -24,11 +24,13 @@ struct SeenVoxels {
 
 class RayCaster {
  public:
-  explicit RayCaster(const OccupancyOptions& options) : max_range_(options.max_range), tree_(options.resolution) {}
+  explicit RayCaster(const OccupancyOptions& options)
+      : min_range_(options.min_range), max_range_(options.max_range), tree_(options.resolution) {}
 
   // A function of its arguments alone. Rays are OctoMap's (J. Amanatides, A. Woo, "A Fast Voxel Traversal Algorithm for
   // Ray Tracing", 1987), one to the center of each voxel that holds points. Rays to points beyond the maximum range end
-  // there, and hit nothing. Points that are not in front of the camera, or out of OctoMap's space, are passed over.
+  // there, and hit nothing. Points nearer than the minimum, not in front of the camera, or out of OctoMap's space, are
+  // passed over.
   SeenVoxels Cast(const Scan& scan, const Rigid3& world_from_camera);
 
  private:
@@ -42,7 +44,7 @@ class RayCaster {
   using Mark = uint32_t;
   std::vector<End> CollectEnds(const Scan& scan, const Rigid3& world_from_camera, VoxelBlocks<Mark>& marks) const;
 
-  double max_range_;
+  double min_range_, max_range_;
   octomap::OcTree tree_;  // holds no nodes: it knows the keys of voxels
   octomap::KeyRay ray_;
 };

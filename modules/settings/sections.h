@@ -282,6 +282,7 @@ struct OccupancySettings {
   static constexpr const char* kSection = "occupancy";
   double resolution_m = 0.0;
   double max_range_m = 0.0;
+  double min_range_m = 0.0;
   double prob_hit = 0.0;
   double prob_miss = 0.0;
   double prob_min = 0.0;
@@ -293,6 +294,7 @@ struct OccupancySettings {
   static void Visit(Self& self, Field&& field) {
     field("resolution_m", self.resolution_m, Range{0, 100, "m"});
     field("max_range_m", self.max_range_m, Range{0, 10'000, "m"});
+    field("min_range_m", self.min_range_m, Range{0, 10'000, "m"});
     field("prob_hit", self.prob_hit, Range{0.501, 0.999});
     field("prob_miss", self.prob_miss, Range{0.001, 0.499});
     field("prob_min", self.prob_min, Range{0.001, 0.499});

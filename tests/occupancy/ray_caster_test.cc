@@ -40,6 +40,15 @@ TEST(RayCaster, ARayEndsAtTheMaximumRangeAndHitsNothingThere) {
   EXPECT_EQ(seen.misses.size(), 21U);
 }
 
+TEST(RayCaster, WhatIsNearerThanTheMinimumRangeIsLeftOut) {
+  OccupancyOptions options = kOptions;
+  options.min_range = 0.7;
+  const SeenVoxels seen = RayCaster(options).Cast(ScanOf({{0, 0, 0.5}}), Rigid3::Identity());
+  EXPECT_TRUE(seen.hits.empty());
+  EXPECT_TRUE(seen.misses.empty());
+  EXPECT_EQ(RayCaster(options).Cast(ScanOf({{0, 0, 1.0}}), Rigid3::Identity()).hits.size(), 1U);
+}
+
 TEST(RayCaster, WhereStereoMayBeWrongARayMissesNothing) {
   const Rigid3 pose{Eigen::Quaterniond::Identity(), {0.05, 0.05, 0.05}};
   Scan scan = ScanOf({{0, 0, 1.0}});

@@ -35,6 +35,7 @@ TEST(DefaultSettings, OfTheOccupancyStage) {
   const OccupancyOptions options;
   EXPECT_EQ(settings.resolution_m, options.resolution);
   EXPECT_EQ(settings.max_range_m, options.max_range);
+  EXPECT_EQ(settings.min_range_m, options.min_range);
   EXPECT_EQ(settings.prob_hit, options.prob_hit);
   EXPECT_EQ(settings.prob_miss, options.prob_miss);
   EXPECT_EQ(settings.prob_min, options.prob_min);

@@ -18,6 +18,7 @@ OccupancySessionOptions OptionsFrom(const Settings& settings) {
   OccupancySessionOptions options;
   options.map = {.resolution = occupancy.resolution_m,
                  .max_range = occupancy.max_range_m,
+                 .min_range = occupancy.min_range_m,
                  .prob_hit = occupancy.prob_hit,
                  .prob_miss = occupancy.prob_miss,
                  .prob_min = occupancy.prob_min,
