@@ -76,6 +76,7 @@ MapDelta Mapper::Process(const KeyframeObservation& seen, const DueCorrections& 
   ApplyDue(due, seen.id, editor);
   const bool has_new_lens = RefineLens(seen, editor), is_mended = MendScale(seen, editor);
   is_repeatable_ = due.loops.empty() && !due.adjustment && !has_new_lens && !is_mended;
+  RemoveNotScene(seen, editor);
   Insert(seen, editor);
   RememberMotion(seen);
   ObserveLandmarks(seen, editor);
@@ -204,6 +205,12 @@ bool Mapper::MendScale(const KeyframeObservation& seen, MapEditor& editor) {
   ++num_scale_mendings_;
   NoteCorrected(seen.id);
   return true;
+}
+
+void Mapper::RemoveNotScene(const KeyframeObservation& seen, MapEditor& editor) {
+  for (const LandmarkId id : seen.not_scene) {
+    if (map_.FindLandmark(id) != nullptr) editor.RemoveLandmark(id);
+  }
 }
 
 // Poses moved: what loops and an adjustment under way are measured against is gone.

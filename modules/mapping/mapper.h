@@ -89,6 +89,7 @@ class Mapper {
   bool ApplyDueAdjustment(const GlobalAdjustment& adjustment, KeyframeId now, MapEditor& editor);
   bool RefineLens(const KeyframeObservation& seen, MapEditor& editor);
   bool MendScale(const KeyframeObservation& seen, MapEditor& editor);
+  void RemoveNotScene(const KeyframeObservation& seen, MapEditor& editor);
   void NoteCorrected(KeyframeId now);
   bool AskForAdjustment(KeyframeId now);
   void Insert(const KeyframeObservation& seen, MapEditor& editor);

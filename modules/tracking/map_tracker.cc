@@ -23,6 +23,7 @@ constexpr double kExact = 1e12;          // information about a pose that is tak
 constexpr double kMinJump_px = 10.0;     // in the image
 constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
 constexpr double kDriftInterval_s = 0.1;
+constexpr int kNewsOfBody = 10;          // pieces of the image: the mapper is to hear of it now
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
 // What a camera that stood goes until the next frame, in the image: a standard deviation.
 constexpr double kStart_px = 1.0;
@@ -80,7 +81,8 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
-  const CapturedFrame captured = times_.Captured(features, replica_.map().lens());
+  WatchBody(features);
+  const CapturedFrame captured = times_.Captured(own_body_.Without(features), replica_.map().lens());
   const Frame& view = captured.view;
   calibration_ = features.calibration;
   const State before = state();
@@ -120,6 +122,17 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   if (tracked_utime_us_) result.pose.since_tracked_us = features.utime_us - *tracked_utime_us_;
   previous_utime_us_ = features.utime_us;
   return result;
+}
+
+// A pose by points that moved with the camera was wrong, and so is what it said of motion and of what stands still.
+void MapTracker::WatchBody(const FeatureFrame& features) {
+  if (features.frame == body_frame_) return;
+  body_frame_ = features.frame;
+  const int num_before = own_body_.num_found();
+  own_body_.Add(features);
+  if (own_body_.num_found() == num_before) return;
+  scene_ = {};
+  ForgetMotion();
 }
 
 MapTracker::State MapTracker::state() const {
@@ -456,7 +469,8 @@ bool MapTracker::IsKeyframeDue() {
   }
   const Rigid3 world_from_reference = WorldFromReference().Pose();
   const int64_t interval_us = frame.view->features().utime_us - previous_utime_us_;
-  const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near);
+  const bool has_news = own_body_.num_found() >= num_body_told_ + kNewsOfBody;
+  const bool is_due = decision_.Decide(frame, interval_us, world_from_reference, near) || has_news;
   return is_due && static_cast<int>(replica_.sent().size()) < options_.max_unanswered_keyframes;
 }
 
@@ -466,6 +480,7 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
   const KeyframeId id = next_keyframe_;
   const bool begins_part = !reference_.id.valid();
   KeyframeObservation keyframe = ObserveKeyframe(id, localized, calibration_, reference_, replica_);
+  keyframe.not_scene = LandmarksOnBody(id);
   if (!begins_part && !mending_) {
     keyframe.mendings = ground_.Mendings();
     if (!keyframe.mendings.empty()) mending_ = {id, keyframe.mendings.back().keyframe};
@@ -492,6 +507,15 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
   ++next_keyframe_.value;
   localized.reference_from_camera = Rigid3::Identity();
   return keyframe;
+}
+
+// Landmarks of the map that moved with the camera, while there is news of them.
+std::vector<LandmarkId> MapTracker::LandmarksOnBody(KeyframeId keyframe) {
+  if (own_body_.num_found() > num_body_told_) {
+    num_body_told_ = own_body_.num_found();
+    tells_body_until_ = {keyframe.value + options_.max_unanswered_keyframes};
+  }
+  return keyframe <= tells_body_until_ ? LandmarksOn(own_body_, replica_.map()) : std::vector<LandmarkId>();
 }
 
 void MapTracker::WatchScale() {

@@ -27,6 +27,7 @@
 #include "tracking/lost_way.h"
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
+#include "tracking/own_body.h"
 #include "tracking/part_start.h"
 #include "tracking/reference_keyframe.h"
 #include "tracking/scale_watch.h"
@@ -80,6 +81,8 @@ class MapTracker {
   // Mono: by how much the scale may have drifted since this part of the map began (ScaleWatch::drift). 0 where depth is
   // measured.
   double scale_drift() const { return scale_.drift(); }
+  // What moves with the camera; its keypoints take no part.
+  const OwnBody& own_body() const { return own_body_; }
   // What was learned of the camera.
   const CaptureTimes& times() const { return times_; }
 
@@ -100,6 +103,7 @@ class MapTracker {
     KeyframeId since;     // that the last of them names
   };
 
+  void WatchBody(const FeatureFrame& features);
   void UpdateLast();
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
@@ -127,6 +131,7 @@ class MapTracker {
 
   bool IsKeyframeDue();
   KeyframeObservation MakeKeyframe(LocalizedFrame& localized);
+  std::vector<LandmarkId> LandmarksOnBody(KeyframeId keyframe);
   void WatchScale();
   void WatchGround(const TrackedFrame& frame, const CaptureTimes::Step& step, const StepPose& pose);
 
@@ -143,6 +148,10 @@ class MapTracker {
   std::optional<LocalizedFrame> last_;  // that was tracked; nullopt: no part of the map is followed
   MotionModel motion_;                  // in the reference's units
   CaptureTimes times_;
+  OwnBody own_body_;
+  FrameId body_frame_;           // the last that it was shown
+  int num_body_told_ = 0;        // OwnBody::num_found() when its landmarks were named
+  KeyframeId tells_body_until_;  // keyframes on their way may bring more of them
   KeyframeId next_keyframe_{0};
   ReferenceKeyframe reference_;
   WayCorrections way_corrections_;

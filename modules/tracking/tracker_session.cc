@@ -90,7 +90,7 @@ std::optional<MapTrackingResult> TrackerSession::Track(const FeatureFrame& featu
   MapTrackingResult result = tracker_.Track(features, time_->TakeAnswer(features.frame), may_ask);
   if (!result.asks_relocalization) return result;
   if (time_->Ask(features.frame)) {
-    question_ = {features, tracker_.last_keyframe()};
+    question_ = {tracker_.own_body().Without(features), tracker_.last_keyframe()};
     actions.emplace_back(question_);
   }
   if (time_->AwaitsAnswer(features.frame)) return std::nullopt;

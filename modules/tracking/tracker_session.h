@@ -63,6 +63,7 @@ class TrackerSession {
   double scale_drift() const { return tracker_.scale_drift(); }
   double readout_s() const { return tracker_.times().readout_s(); }
   double depth_delay_s() const { return tracker_.times().depth_delay_s(); }
+  double own_body_share() const { return tracker_.own_body().share(); }
   // The question that was sent and is not answered yet, to be sent again from time to time: a loop closer that was
   // started again did not hear it. nullptr: none.
   const RelocalizationRequest* open_question() const { return time_->has_open_question() ? &question_ : nullptr; }

@@ -79,6 +79,9 @@ struct Layout<keyframe_t> {
     const auto are_in_order = std::ranges::is_sorted(keyframe.mendings, std::less_equal{}, &ScaleMending::keyframe);
     fields.Check(are_in_order && (keyframe.mendings.empty() || keyframe.mendings.back().keyframe < keyframe.id),
                  "the keyframes from which the scale is to be mended are not in order");
+    fields.List(message.num_not_scene, message.not_scene, keyframe.not_scene);
+    fields.Check(std::ranges::is_sorted(keyframe.not_scene, std::less_equal{}),
+                 "the landmarks that are none of the scene are not in order");
   }
 };
 TESSERA_CODEC(KeyframeObservation, keyframe_t);

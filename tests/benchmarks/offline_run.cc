@@ -167,7 +167,8 @@ class Mapping {
 MapTrackingResult TrackOrAsk(MapTracker& tracker, const FeatureFrame& features, OfflineRun& run) {
   MapTrackingResult result = tracker.Track(features, nullptr, run.loop_closer != nullptr);
   if (!result.asks_relocalization) return result;
-  const RelocalizationAnswer answer = run.loop_closer->Relocalize({features, tracker.last_keyframe()});
+  const RelocalizationAnswer answer =
+      run.loop_closer->Relocalize({tracker.own_body().Without(features), tracker.last_keyframe()});
   run.num_relocalized += answer.reference.valid() ? 1 : 0;
   return tracker.Track(features, &answer);
 }

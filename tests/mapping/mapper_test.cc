@@ -198,6 +198,23 @@ TEST(Mapper, LandmarksThatAreGoneAreSkipped) {
   EXPECT_LE(std::count(keyframe.landmarks.begin(), keyframe.landmarks.end(), LandmarkId{0}), 1);
 }
 
+TEST(Mapper, LandmarksThatAreNoneOfTheSceneGo) {
+  SyntheticWorld world(SensorType::kStereo, 0.2);
+  Drive drive(world, 0.0, 1);
+  Mapper mapper({});
+  (void)mapper.Process(drive.Next(0));
+  ASSERT_NE(mapper.map().FindLandmark({20}), nullptr);
+  KeyframeObservation seen = drive.Next(1);
+  for (int64_t id = 0; id < 20; ++id) seen.not_scene.push_back({id});
+  seen.not_scene.push_back({1000000});
+  const MapDelta second = mapper.Process(seen);
+  for (int64_t id = 0; id < 20; ++id) {
+    EXPECT_EQ(mapper.map().FindLandmark({id}), nullptr);
+    EXPECT_EQ(std::ranges::count(second.removed_landmarks, LandmarkId{id}), 1);
+  }
+  EXPECT_NE(mapper.map().FindLandmark({20}), nullptr);
+}
+
 // The keyframe comes into a map whose last keyframes are twice as far apart as they were.
 TEST(Mapper, MendsTheScaleBeforeTheKeyframeComesInUnlessALoopHasSetIt) {
   for (const bool has_loop : {false, true}) {

@@ -292,6 +292,7 @@ KeyframeObservation DrawValue<KeyframeObservation>(std::mt19937& generator, int 
                                DrawPose(generator).translation});
     keyframe.mendings = {{{id - 7}, 0.5}, {{id - 2}, -0.7}};
   }
+  keyframe.not_scene = {{3}, {17}};
   return keyframe;
 }
 template <>
@@ -306,7 +307,7 @@ bool AreSame(const KeyframeObservation& a, const KeyframeObservation& b) {
          a.expected.position_in_reference == b.expected.position_in_reference &&
          a.expected.information == b.expected.information &&
          std::equal(a.shared.begin(), a.shared.end(), b.shared.begin(), b.shared.end(), is_same) &&
-         a.mendings == b.mendings;
+         a.mendings == b.mendings && a.not_scene == b.not_scene;
 }
 
 namespace {

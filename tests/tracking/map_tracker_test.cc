@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <random>
 #include <vector>
 
 #include "mapping/mapper.h"
@@ -455,6 +456,40 @@ TEST(MapTracker, WhatHidesTheSceneForLongIsTheScene) {
   });
   EXPECT_EQ(poses[31].state, TrackingState::kLost);
   EXPECT_EQ(poses.back().state, TrackingState::kTracked) << "a new part";
+}
+
+// A robot's own top, 0.6 m before its camera, has more keypoints than the scene: they say that it stands.
+TEST(MapTracker, IsNotHeldByWhatMovesWithTheCamera) {
+  constexpr int64_t kEnd = 40;
+  SyntheticWorld world(SensorType::kRgbd, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  Mapper mapper{MapperOptions{}};
+  std::mt19937_64 generator(3);
+  std::vector<Descriptor> top(900);
+  for (Descriptor& descriptor : top) descriptor = {generator(), generator(), generator(), generator()};
+  std::vector<PoseEstimate> poses;
+  const auto at = [](int64_t frame) { return 0.1 * static_cast<double>(frame); };
+  for (int64_t frame = 0; frame < kEnd; ++frame) {
+    FeatureFrame features = world.Take(frame, world.Pose(at(frame))).features;
+    for (size_t i = 0; i < top.size(); ++i) {
+      const float x_px = 10.0F + 12.0F * static_cast<float>(i % 50);
+      const float y_px = static_cast<float>(features.calibration.height_px) - 8.0F * static_cast<float>(1 + i / 50);
+      features.keypoints.push_back({.x_px = x_px, .y_px = y_px, .depth_m = 0.6F, .score = 100});
+      features.descriptors.push_back(top[i]);
+    }
+    const MapTrackingResult result = tracker.Track(features);
+    poses.push_back(result.pose);
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+    }
+  }
+  // Where it is when the top has shown itself, a loop closer would say.
+  const auto way = [&poses](size_t frame) { return poses[frame].world_from_camera.translation; };
+  for (size_t frame = 32; frame < poses.size(); frame += 4) {
+    ASSERT_EQ(poses[frame].state, TrackingState::kTracked) << frame;
+    EXPECT_NEAR((way(frame) - way(frame - 2)).norm(), 0.1, 0.02) << frame;
+  }
+  EXPECT_TRUE(LandmarksOn(tracker.own_body(), mapper.map()).empty()) << "they have left the map";
 }
 
 }  // namespace

@@ -115,6 +115,7 @@ void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
   context_.SetValue("scale_drift", session_.scale_drift());
   context_.SetValue("readout_ms", 1e3 * session_.readout_s());
   context_.SetValue("depth_delay_ms", 1e3 * session_.depth_delay_s());
+  context_.SetValue("own_body_share", session_.own_body_share());
 }
 
 void TrackerStage::Publish(PoseEstimate pose, int64_t began_us) {

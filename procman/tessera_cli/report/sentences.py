@@ -33,6 +33,7 @@ def headline(result: Result) -> list[str]:
         _drift(result),
         _lens(result),
         _readout(result),
+        _own_body(result),
         _failures(result),
     ]
     return [sentence for sentence in sentences if sentence]
@@ -126,6 +127,18 @@ def _readout(result: Result) -> str:
         return ""
     sentence = " and ".join(found)
     return f"{sentence[0].upper()}{sentence[1:]}; keypoints were corrected for it."
+
+
+def _own_body(result: Result) -> str:
+    """What moves with the camera, as far as the tracker has found any."""
+    values = (result.summary.get("stage_values") or {}).get("tracker", {})
+    share = values.get("own_body_share") or 0.0
+    if not share:
+        return ""
+    return (
+        f"{100 * share:.0f} % of the image moves with the camera (what carries it, a time stamp, dirt on the lens): "
+        "keypoints there were left out."
+    )
 
 
 def _failures(result: Result) -> str:

@@ -176,6 +176,13 @@ def test_a_rolling_shutter_and_late_depths_are_told(tmp_path: Path) -> None:
         assert len(told) == bool(words) and (not told or words in told[0])
 
 
+def test_what_moves_with_the_camera_is_told(tmp_path: Path) -> None:
+    for share, words in [(0.057, "6 % of the image moves with the camera"), (0.0, "")]:
+        folder = write_run(tmp_path / f"{share}", sensor="rgbd", stage_values={"tracker": {"own_body_share": share}})
+        told = [sentence for sentence in headline(read_run(folder)) if "moves with the camera" in sentence]
+        assert len(told) == bool(words) and (not told or words in told[0])
+
+
 def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:
     folder = write_run(
         tmp_path / "drive", loops=False, frames_tracked=0, pose_time_ms=None, latency_ms=None, map_wait_ms=None
