@@ -472,8 +472,9 @@ TEST(MapTracker, IsNotHeldByWhatMovesWithTheCamera) {
   for (int64_t frame = 0; frame < kEnd; ++frame) {
     FeatureFrame features = world.Take(frame, world.Pose(at(frame))).features;
     for (size_t i = 0; i < top.size(); ++i) {
+      const size_t row = 1 + i / 50;
       const float x_px = 10.0F + 12.0F * static_cast<float>(i % 50);
-      const float y_px = static_cast<float>(features.calibration.height_px) - 8.0F * static_cast<float>(1 + i / 50);
+      const float y_px = static_cast<float>(features.calibration.height_px) - 8.0F * static_cast<float>(row);
       features.keypoints.push_back({.x_px = x_px, .y_px = y_px, .depth_m = 0.6F, .score = 100});
       features.descriptors.push_back(top[i]);
     }
