@@ -87,7 +87,7 @@ struct KeyframeObservation {
   MotionPrior expected;                // by how the camera moved when `reference` was made; where images leave it open
   std::vector<SharedKeypoint> shared;  // points without an id yet: mono's first ones, or from depth
   std::vector<ScaleMending> mendings;  // by keyframe, earlier ones of its part; empty: its scale has not slipped
-  std::vector<LandmarkId> not_scene;   // landmarks that turned out to move with the camera (tracking/own_body.h)
+  std::vector<LandmarkId> not_scene;   // by id: that turned out to move with the camera (tracking/own_body.h)
   int64_t num_deltas = 0;              // as in PoseEstimate
 };
 

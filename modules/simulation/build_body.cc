@@ -18,15 +18,15 @@ void AddBody(const CameraCalibration& camera, double share, double reach_m, uint
   const auto at = [&](double side, double ahead, double above_m) -> Eigen::Vector3d {
     return {side * half_width_m, near_y_m + ahead * (far_y_m - near_y_m) - above_m, near_m + ahead * (far_m - near_m)};
   };
+  const auto put = [&](const Eigen::Vector3d& corner, const Eigen::Vector3d& across, const Eigen::Vector3d& up,
+                       Material material) {
+    const int32_t paint = builder.AddPaint({material, random.Next(), across.norm(), up.norm(), texel_m});
+    world.body.push_back({.corner = corner, .across = across, .up = up, .paint = paint, .two_sided = true});
+  };
   // A rectangle on the top.
   const auto lay = [&](double left, double right, double near, double far, double above_m, Material material) {
-    Surface surface;
-    surface.corner = at(left, near, above_m);
-    surface.across = at(right, near, above_m) - surface.corner;
-    surface.up = at(left, far, above_m) - surface.corner;
-    surface.paint = builder.AddPaint({material, random.Next(), surface.across.norm(), surface.up.norm(), texel_m});
-    surface.two_sided = true;
-    world.body.push_back(surface);
+    const Eigen::Vector3d corner = at(left, near, above_m);
+    put(corner, at(right, near, above_m) - corner, at(left, far, above_m) - corner, material);
   };
   lay(-1.0, 1.0, 0.0, 1.0, 0.0, Material::kCarRoof);
   // Stickers, vents, lettering.
@@ -40,14 +40,9 @@ void AddBody(const CameraCalibration& camera, double share, double reach_m, uint
   }
   // What stands on it: a mascot, a bumper bar or a gripper.
   for (const double side : {random.Uniform(-0.4, -0.1), random.Uniform(0.2, 0.5)}) {
-    Surface stands;
     const double height_m = random.Uniform(0.02, 0.05) * reach_m;
-    stands.corner = at(side, 0.95, 0.0);
-    stands.across = {random.Uniform(0.04, 0.12) * reach_m, 0.0, 0.0};
-    stands.up = {0.0, -height_m, 0.0};
-    stands.paint = builder.AddPaint({Material::kSign, random.Next(), stands.across.x(), height_m, texel_m});
-    stands.two_sided = true;
-    world.body.push_back(stands);
+    const double width_m = random.Uniform(0.04, 0.12) * reach_m;
+    put(at(side, 0.95, 0.0), {width_m, 0.0, 0.0}, {0.0, -height_m, 0.0}, Material::kSign);
   }
 }
 

@@ -48,7 +48,8 @@ class EffectsPipeline {
   Image<float> vignette_;  // factor by pixel
 };
 
-// Writes the time with a name in front into the image's upper left corner: white letters with a dark border.
+// Writes a date, the time and a camera's number into the image's upper left corner, as dashcams do: white digits with a
+// dark border.
 void StampTime(double time_s, GrayImage& image);
 
 }  // namespace tessera

@@ -102,7 +102,7 @@ World BuildStreets(const StreetPlan& plan, uint32_t seed);
 // way to 0.75 a lorry in front of it, that stops as it does and starts 1.5 s earlier.
 void AddTraffic(const StreetPlan& plan, const std::shared_ptr<const CarTrajectory>& drive, uint32_t seed, World& world);
 // What carries the camera and stands in its picture, over `share` of the height at the bottom and up to `reach_m`
-// ahead: a car's bonnet with stickers, vents and wipers, or a robot's top with what it bears.
+// ahead: a car's bonnet with stickers and vents, or a robot's top with what it bears.
 void AddBody(const CameraCalibration& camera, double share, double reach_m, uint32_t seed, World& world);
 // A furnished room with its middle at the origin; x, height, z.
 World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);

@@ -44,15 +44,17 @@ bool OwnBody::Scene::Contradicts(double depth_m) const {
   return IsNearerThanMost(depth_m) || (turns && !is_behind_most);
 }
 
+int OwnBody::num_rows() const { return num_cells() / kColumns; }
+
 int OwnBody::CellOf(const Keypoint& keypoint) const {
   const auto at = [this](float px, int num) {
     return static_cast<int>(std::clamp(static_cast<double>(px) / cell_px_, 0.0, num - 1.0));
   };
-  return num_columns_ * at(keypoint.y_px, size_ / num_columns_) + at(keypoint.x_px, num_columns_);
+  return kColumns * at(keypoint.y_px, num_rows()) + at(keypoint.x_px, kColumns);
 }
 
 void OwnBody::Add(const FeatureFrame& features) {
-  if (size_ == 0 || features.calibration != camera_) {
+  if (cells_.empty() || features.calibration != camera_) {
     Restart(features.calibration);
     SetMarks(features);
     return;
@@ -85,10 +87,8 @@ FeatureFrame OwnBody::Without(FeatureFrame features) const {
 
 void OwnBody::Restart(const CameraCalibration& camera) {
   camera_ = camera;
-  num_columns_ = kColumns;
   cell_px_ = std::max(1.0, static_cast<double>(camera.width_px) / kColumns);
-  size_ = num_columns_ * std::max(1, static_cast<int>(std::ceil(camera.height_px / cell_px_)));
-  cells_.assign(Index(size_), {});
+  cells_.assign(Index(kColumns * std::max(1, static_cast<int>(std::ceil(camera.height_px / cell_px_)))), {});
   num_body_ = 0;
 }
 
@@ -180,10 +180,10 @@ void OwnBody::Count(const std::vector<CellMarks>& marks, const Scene& scene) {
 // Of a cell and those around it.
 template <class Visit>
 void OwnBody::VisitAround(int cell, Visit visit) const {
-  const int row = cell / num_columns_, column = cell % num_columns_;
-  for (int r = std::max(0, row - 1); r <= std::min(size_ / num_columns_ - 1, row + 1); ++r) {
-    for (int c = std::max(0, column - 1); c <= std::min(num_columns_ - 1, column + 1); ++c) {
-      visit(Index(r * num_columns_ + c));
+  const int row = cell / kColumns, column = cell % kColumns;
+  for (int r = std::max(0, row - 1); r <= std::min(num_rows() - 1, row + 1); ++r) {
+    for (int c = std::max(0, column - 1); c <= std::min(kColumns - 1, column + 1); ++c) {
+      visit(Index(r * kColumns + c));
     }
   }
 }
@@ -193,13 +193,13 @@ void OwnBody::VisitAround(int cell, Visit visit) const {
 void OwnBody::FindBody() {
   std::vector<uint8_t> is_still(cells_.size()), is_inside(cells_.size()), is_body(cells_.size());
   for (size_t i = 0; i < cells_.size(); ++i) is_still[i] = cells_[i].score >= kBodyScore ? 1 : 0;
-  for (int i = 0; i < size_; ++i) {
+  for (int i = 0; i < num_cells(); ++i) {
     int num = 0;
     VisitAround(i, [&](size_t neighbor) { num += is_still[neighbor]; });
     const bool may_be = is_still[Index(i)] != 0 || cells_[Index(i)].score == 0;
     is_inside[Index(i)] = may_be && num >= 3 ? 1 : 0;
   }
-  for (int i = 0; i < size_; ++i) {
+  for (int i = 0; i < num_cells(); ++i) {
     bool is_beside = false;
     VisitAround(i, [&](size_t neighbor) { is_beside |= is_inside[neighbor] != 0; });
     is_body[Index(i)] = is_inside[Index(i)] != 0 || (is_still[Index(i)] != 0 && is_beside) ? 1 : 0;

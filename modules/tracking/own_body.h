@@ -26,9 +26,9 @@ class OwnBody {
   FeatureFrame Without(FeatureFrame features) const;
 
   // In pixels as the source gives them.
-  bool Covers(const Keypoint& keypoint) const { return size_ > 0 && cells_[Index(CellOf(keypoint))].is_body; }
+  bool Covers(const Keypoint& keypoint) const { return !cells_.empty() && cells_[Index(CellOf(keypoint))].is_body; }
   // Of the image.
-  double share() const { return size_ == 0 ? 0.0 : static_cast<double>(num_body_) / size_; }
+  double share() const { return cells_.empty() ? 0.0 : static_cast<double>(num_body_) / num_cells(); }
   // How many pieces of the image have ever been taken for the body.
   int num_found() const { return num_found_; }
 
@@ -64,7 +64,8 @@ class OwnBody {
     bool IsNearerThanMost(double depth_m) const;
   };
 
-  static size_t Index(int i) { return static_cast<size_t>(i); }
+  int num_cells() const { return static_cast<int>(cells_.size()); }
+  int num_rows() const;
   int CellOf(const Keypoint& keypoint) const;
   void Restart(const CameraCalibration& camera);
   void SetMarks(const FeatureFrame& features);
@@ -77,11 +78,10 @@ class OwnBody {
 
   CameraCalibration camera_;
   double cell_px_ = 1.0;
-  int num_columns_ = 0, size_ = 0;  // of the cells
-  std::vector<Cell> cells_;         // row by row
-  std::vector<Mark> marks_;         // keypoints of one frame, a few of each cell
-  int64_t marked_us_ = 0;           // when it was taken
-  int64_t looked_us_ = 0;           // when they were looked for last
+  std::vector<Cell> cells_;  // row by row
+  std::vector<Mark> marks_;  // keypoints of one frame, a few of each cell
+  int64_t marked_us_ = 0;    // when it was taken
+  int64_t looked_us_ = 0;    // when they were looked for last
   int num_body_ = 0, num_found_ = 0;
 };
 

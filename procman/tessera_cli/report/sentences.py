@@ -88,7 +88,7 @@ def _loops(result: Result) -> str:
 
 def _drift(result: Result) -> str:
     """By how much the scale of mono may have changed; loops take some of it back."""
-    drift = (result.summary.get("stage_values") or {}).get("tracker", {}).get("scale_drift")
+    drift = _values(result, "tracker").get("scale_drift")
     if not drift or result.summary.get("sensor") != "mono":
         return ""
     loops = ", which loops have corrected in part" if num_loops(result) else ""
@@ -98,7 +98,7 @@ def _drift(result: Result) -> str:
 
 
 def _lens(result: Result) -> str:
-    values = (result.summary.get("stage_values") or {}).get("mapper", {})
+    values = _values(result, "mapper")
     error, radial = values.get("focal_error"), values.get("lens_radial")
     if not error:
         return ""
@@ -113,9 +113,14 @@ def _lens(result: Result) -> str:
     )
 
 
+def _values(result: Result, stage: str) -> dict[str, float]:
+    """What this stage told last in STATUS; runs of older versions know less."""
+    return (result.summary.get("stage_values") or {}).get(stage, {})
+
+
 def _readout(result: Result) -> str:
     """What the tracker learned of when rows and depths are read."""
-    values = (result.summary.get("stage_values") or {}).get("tracker", {})
+    values = _values(result, "tracker")
     readout_ms, delay_ms = values.get("readout_ms") or 0.0, values.get("depth_delay_ms") or 0.0
     found = []
     if readout_ms:
@@ -131,7 +136,7 @@ def _readout(result: Result) -> str:
 
 def _own_body(result: Result) -> str:
     """What moves with the camera, as far as the tracker has found any."""
-    values = (result.summary.get("stage_values") or {}).get("tracker", {})
+    values = _values(result, "tracker")
     share = values.get("own_body_share") or 0.0
     if not share:
         return ""
