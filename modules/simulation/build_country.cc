@@ -53,8 +53,8 @@ class CountryBuilder {
           break;
       }
     }
-    BuildRidges();
-    BuildSky();
+    AddRidges(middle_, reach_ + kBeyondM, random_, builder_);
+    AddClouds(middle_, HashOf(seed_, 6), builder_);
   }
 
  private:
@@ -206,45 +206,6 @@ class CountryBuilder {
       half->brightness = BrightnessOf(normal.y() < 0.0 ? normal : Eigen::Vector3d(-normal));
       builder_.Add(*half);
     }
-  }
-
-  void BuildRidges() {
-    AddRidge(kBeyondM, 95.0, 1.0, 78.0);
-    AddRidge(kBeyondM + 900.0, 190.0, 2.0, 125.0);
-    AddRidge(kBeyondM + 2600.0, 420.0, 4.0, 160.0);
-  }
-
-  // A ring of walls around the lap; seen from inside.
-  void AddRidge(double beyond_m, double height_m, double texel_m, double tone) {
-    constexpr size_t kPerQuarter = 10;
-    constexpr double kDeepM = 60.0;
-    const uint32_t seed = random_.Next();
-    double along = 0.0;
-    for (size_t i = 0; i < 4 * kPerQuarter; ++i) {
-      const auto at = [&](size_t k) -> Eigen::Vector2d {
-        k %= 4 * kPerQuarter;
-        const double part = static_cast<double>(k % kPerQuarter) / kPerQuarter;
-        return middle_ + (reach_ + beyond_m) * OnCircle(k / kPerQuarter, part);
-      };
-      const Eigen::Vector2d from = at(i + 1), to = at(i);
-      const double width = (to - from).norm();
-      const PaintSpec spec{Material::kRidge, seed, width, height_m + kDeepM, texel_m, {-along - width, 0.0}, tone};
-      Surface wall = builder_.Wall(from, to, -kDeepM, height_m + kDeepM, builder_.AddPaint(spec));
-      wall.brightness = 1.0F;
-      wall.two_sided = true;
-      builder_.world().far.push_back(wall);
-      along += width;
-    }
-  }
-
-  void BuildSky() {
-    constexpr double kSkyM = 14000.0;
-    const int32_t clouds = builder_.AddPaint({Material::kSky, HashOf(seed_, 6), 2.0 * kSkyM, 2.0 * kSkyM, 8.0});
-    builder_.world().far.push_back({{middle_.x() - kSkyM, -1400.0, middle_.y() + kSkyM},
-                                    {2.0 * kSkyM, 0.0, 0.0},
-                                    {0.0, 0.0, -2.0 * kSkyM},
-                                    clouds,
-                                    1.0F});
   }
 
   const CountryPlan& plan_;

@@ -1,6 +1,5 @@
 // Vehicles that take much of the image, and move.
 #include <algorithm>
-#include <array>
 
 #include "simulation/random.h"
 #include "simulation/world.h"
@@ -40,7 +39,7 @@ class TrafficBuilder {
       MovingCar car;
       car.way = lane;
       car.position_m = [=](double time_s) { return passes_m + speed_mps * (time_s - passes_s); };
-      car.body = random_.Chance(0.6) ? BuildBox(random_.Uniform(6.0, 12.0))
+      car.body = random_.Chance(0.6) ? BuildLorry(random_.Uniform(6.0, 12.0), random_, builder_)
                                      : BuildCar(kOrigin, kAhead, random_.Next(), builder_);
       world_.cars.push_back(std::move(car));
     }
@@ -59,21 +58,8 @@ class TrafficBuilder {
           60.0 * (1.0 - Ease((there_m - from_m) / kComesM)) + 200.0 * Ease((there_m - to_m) / kLeavesM);
       return there_m + kGapM + 0.5 * kLengthM + farther_m;
     };
-    lorry.body = BuildBox(kLengthM);
+    lorry.body = BuildLorry(kLengthM, random_, builder_);
     world_.cars.push_back(std::move(lorry));
-  }
-
-  // A bus or a lorry.
-  std::vector<Surface> BuildBox(double length_m) {
-    constexpr double kHalfWidthM = 1.25;
-    const double height_m = random_.Uniform(2.8, 3.6);
-    // Windows, a plain side, or advertisements.
-    constexpr std::array kSides{Material::kFacade, Material::kCarSide, Material::kSign};
-    const Material side = kSides[static_cast<size_t>(random_.Index(kSides.size()))];
-    const uint32_t seed = random_.Next();
-    const int32_t sides = builder_.AddPaint({side, seed, length_m, height_m, 0.02});
-    const int32_t ends = builder_.AddPaint({Material::kSign, seed + 1, 2.0 * kHalfWidthM, height_m, 0.02});
-    return builder_.Box(kOrigin, kAhead, 0.5 * length_m, kHalfWidthM, 0.25, height_m, sides, ends);
   }
 
   inline static const Eigen::Vector2d kOrigin{0.0, 0.0}, kAhead{0.0, 1.0};

@@ -5,6 +5,14 @@
 #include "simulation/canvas.h"
 
 namespace tessera {
+namespace {
+
+const StreetMap& Needed(const StreetMap* map) {
+  if (map == nullptr) throw std::invalid_argument("ground needs a street map");
+  return *map;
+}
+
+}  // namespace
 
 Texture PaintPlain(const PaintSpec& spec, double tone, double fine, double coarse) {
   Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, tone, {fine, coarse});
@@ -17,9 +25,13 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
     case Material::kFacade:
       return PaintFacade(spec);
     case Material::kGround:
+      return PaintGround(spec, Needed(map));
     case Material::kCountryRoad:
-      if (map == nullptr) throw std::invalid_argument("ground needs a street map");
-      return spec.material == Material::kGround ? PaintGround(spec, *map) : PaintCountryRoad(spec, *map);
+      return PaintCountryRoad(spec, Needed(map));
+    case Material::kHighway:
+      return PaintHighway(spec, Needed(map));
+    case Material::kNoiseBarrier:
+      return PaintNoiseBarrier(spec);
     case Material::kCurb:
       return PaintPlain(spec, 150.0, 14.0, 14.0);
     case Material::kFoliage:

@@ -20,12 +20,14 @@ enum class Material {
   kBark,
   kHedge,
   kFence,
+  kNoiseBarrier,  // panels between steel posts
   kCarSide,
   kCarEnd,
   kCarRoof,
   kSign,
   kSky,
   kSkyline,      // far buildings
+  kHighway,      // lanes, lines and verges, as the street map says for `origin`
   kCountryRoad,  // a road of little texture between fields, as the street map says for `origin`
   kField,        // a meadow or an acre of little texture
   kRidge,        // a wooded hill against the sky
@@ -53,7 +55,7 @@ struct PaintSpec {
   double roughness = 1.0;  // kCountryRoad: how strong the texture of road and verge is
 };
 
-// `map` may be null if the material is neither kGround nor kCountryRoad.
+// `map` may be null if the material is not kGround, kCountryRoad or kHighway.
 Texture Paint(const PaintSpec& spec, const StreetMap* map);
 
 // The single materials.
@@ -61,6 +63,8 @@ Texture PaintFacade(const PaintSpec& spec);
 Texture PaintSkyline(const PaintSpec& spec);
 Texture PaintGround(const PaintSpec& spec, const StreetMap& map);
 Texture PaintCountryRoad(const PaintSpec& spec, const StreetMap& map);
+Texture PaintHighway(const PaintSpec& spec, const StreetMap& map);
+Texture PaintNoiseBarrier(const PaintSpec& spec);
 Texture PaintField(const PaintSpec& spec);
 Texture PaintRidge(const PaintSpec& spec);
 // Ground of which each texel's gray follows from its position in the street and its number x, y in the world.

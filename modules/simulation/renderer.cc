@@ -254,8 +254,6 @@ Renderer::~Renderer() = default;
 
 void Renderer::Collect(const CameraCalibration& camera, const Rigid3& world_from_camera, double time_s,
                        double margin_px) {
-  // No moving car is drawn so near that it could sit on the camera.
-  constexpr double kCarGapM = 4.5;
   visible_.clear();
   const Rigid3 camera_from_world = world_from_camera.Inverse();
   const Eigen::Vector3d eye = camera_from_world.Inverse().translation;
@@ -270,7 +268,7 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& world_from
   for (const Surface& surface : world_->far) add(surface, 1e9);
   for (const MovingCar& car : world_->cars) {
     const auto body = PlaceCar(car, time_s);
-    if (!body || (body->front().Center() - eye).norm() < kCarGapM) continue;
+    if (!body || (body->front().Center() - eye).norm() < car.gap_m) continue;
     for (const Surface& surface : *body) add(surface, world_->sight_m);
   }
   std::sort(visible_.begin(), visible_.end(), [](const Visible& a, const Visible& b) {

@@ -8,6 +8,7 @@
 #include "core/errors.h"
 #include "simulation/country.h"
 #include "simulation/depth_sensor.h"
+#include "simulation/highway.h"
 
 namespace tessera {
 namespace {
@@ -16,6 +17,7 @@ using Scene = SimulationOptions::Scene;
 
 const Eigen::Vector3d kRoomM(6.4, 2.7, 5.2);
 constexpr CarMotion kCountryDrive{.cruise_mps = 17.0, .side_acceleration_mps2 = 3.5, .drives_on = true};
+constexpr CarMotion kHighwayDrive{.cruise_mps = 28.0, .side_acceleration_mps2 = 3.5, .drives_on = true};
 
 // What is mounted, and how often it takes a picture.
 struct CameraModel {
@@ -137,15 +139,16 @@ SimulationOptions ParseSimulation(const std::string& text) {
   SimulationOptions options;
   const std::string name = text.substr(0, text.find(','));
   const std::map<std::string, Scene> scenes{{"street", Scene::kStreet},   {"street-short", Scene::kStreetShort},
-                                            {"traffic", Scene::kTraffic}, {"room", Scene::kRoom},
-                                            {"country", Scene::kCountry}, {"walk", Scene::kWalk},
-                                            {"desk", Scene::kDesk},       {"robot", Scene::kRobot}};
+                                            {"traffic", Scene::kTraffic}, {"highway", Scene::kHighway},
+                                            {"room", Scene::kRoom},       {"country", Scene::kCountry},
+                                            {"walk", Scene::kWalk},       {"desk", Scene::kDesk},
+                                            {"robot", Scene::kRobot}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
-    throw InputError(
-        "sim:" + name +
-        " is unknown: give sim:street, sim:street-short, sim:traffic, sim:room, sim:country, sim:walk, sim:desk or "
-        "sim:robot");
+    throw InputError("sim:" + name +
+                     " is unknown: give sim:street, sim:street-short, sim:traffic, sim:highway, sim:room, sim:country, "
+                     "sim:walk, sim:desk or "
+                     "sim:robot");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -197,6 +200,14 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       const auto terrain = std::make_shared<const Terrain>(plan.road, options.seed);
       trajectory_ = std::make_unique<CarTrajectory>(plan.drive, options.speed, options.seed, kCountryDrive, terrain);
       world = BuildCountry(plan, *terrain, options.seed);
+      break;
+    }
+    case Scene::kHighway: {
+      const HighwayPlan plan = PlanHighway(options.seed, options.length_m);
+      const auto drive = std::make_shared<const CarTrajectory>(plan.drive, options.speed, options.seed, kHighwayDrive);
+      world = BuildHighway(plan, options.seed);
+      AddHighwayTraffic(plan, drive, options.seed, world);
+      trajectory_ = drive;
       break;
     }
     case Scene::kDesk:

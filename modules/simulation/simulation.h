@@ -14,7 +14,7 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kTraffic, kRoom, kCountry, kWalk, kDesk, kRobot };
+  enum class Scene { kStreet, kStreetShort, kTraffic, kHighway, kRoom, kCountry, kWalk, kDesk, kRobot };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;            // another seed, another town
   double length_m = 0.0;        // of a drive; 0: all of it
@@ -33,8 +33,8 @@ struct SimulationOptions {
   Result<> Check() const;
 };
 
-// Reads the name of a world (street, street-short, traffic, room, country, walk, desk, robot) and options behind it:
-// "street,seed=3,length=500". Throws InputError.
+// Reads the name of a world (street, street-short, traffic, highway, room, country, walk, desk, robot) and options
+// behind it: "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 
 class Simulation {

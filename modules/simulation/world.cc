@@ -1,5 +1,6 @@
 #include "simulation/world.h"
 
+#include <array>
 #include <cmath>
 
 #include "simulation/random.h"
@@ -102,6 +103,18 @@ std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector
   car.insert(car.end(), walls.begin(), walls.end());
   car.push_back(builder.Lid(cabin, ahead, 0.27 * length, 0.44 * width, height + cabin_height, roof));
   return car;
+}
+
+std::vector<Surface> BuildLorry(double length_m, Random& random, WorldBuilder& builder) {
+  constexpr double kHalfWidthM = 1.25;
+  const double height_m = random.Uniform(2.8, 3.6);
+  // Windows, a plain side, or advertisements.
+  constexpr std::array kSides{Material::kFacade, Material::kCarSide, Material::kSign};
+  const Material side = kSides[static_cast<size_t>(random.Index(kSides.size()))];
+  const uint32_t seed = random.Next();
+  const int32_t sides = builder.AddPaint({side, seed, length_m, height_m, 0.02});
+  const int32_t ends = builder.AddPaint({Material::kSign, seed + 1, 2.0 * kHalfWidthM, height_m, 0.02});
+  return builder.Box({0.0, 0.0}, {0.0, 1.0}, 0.5 * length_m, kHalfWidthM, 0.25, height_m, sides, ends);
 }
 
 }  // namespace tessera

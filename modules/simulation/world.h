@@ -42,6 +42,7 @@ struct MovingCar {
   Polyline way;                              // every kCarStepM
   std::function<double(double)> position_m;  // along the way, at a time (s); there is none before and behind it
   std::vector<Surface> body;                 // around the origin, facing +z
+  double gap_m = 4.5;  // to the middle of its right side: nearer it isn't drawn, so that it can't sit on the camera
 };
 inline constexpr double kCarStepM = 0.5;
 
@@ -86,6 +87,9 @@ class WorldBuilder {
 std::vector<Surface> BuildCar(const Eigen::Vector2d& middle, const Eigen::Vector2d& ahead, uint32_t seed,
                               WorldBuilder& builder);
 
+// A bus or a lorry around the origin, facing +z.
+std::vector<Surface> BuildLorry(double length_m, Random& random, WorldBuilder& builder);
+
 // What trees of one kind share: they look alike.
 struct TreeKind {
   double crown_m, trunk_m, thick_m;  // width and height of the crown, free height of the trunk, half its thickness
@@ -95,6 +99,10 @@ struct TreeKind {
 TreeKind MakeTreeKind(double crown_m, double trunk_m, double thick_m, Random& random, WorldBuilder& builder);
 // A trunk and three planes of leaves through it, standing on height `ground_m`.
 void PlantTree(const TreeKind& kind, const Eigen::Vector2d& foot, double ground_m, WorldBuilder& builder);
+
+// Three ranges of wooded ridges, the nearest this far from the middle, seen from inside; and clouds above.
+void AddRidges(const Eigen::Vector2d& middle, double radius_m, Random& random, WorldBuilder& builder);
+void AddClouds(const Eigen::Vector2d& middle, uint32_t seed, WorldBuilder& builder);
 
 // Houses, trees, parked and driving cars along the streets; the drive stays free.
 World BuildStreets(const StreetPlan& plan, uint32_t seed);
