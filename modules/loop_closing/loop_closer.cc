@@ -11,7 +11,9 @@ Result<> LoopCloserOptions::Check() const {
   TESSERA_RETURN_IF_FAILED(candidates.Check());
   TESSERA_RETURN_IF_FAILED(verification.Check());
   TESSERA_RETURN_IF_FAILED(correction.Check());
-  if (!(max_contradiction_sigmas > 0.0)) return Failed("a loop must be allowed to contradict the map by something");
+  if (!(max_contradiction_sigmas > 0.0 && max_contradiction_sigmas_with_depth > 0.0)) {
+    return Failed("a loop must be allowed to contradict the map by something");
+  }
   if (!(min_share_to_join >= 0.0 && min_share_to_join <= 1.0)) {
     return Failed("min_share_to_join must be between 0 and 1");
   }
@@ -51,7 +53,10 @@ LoopResult LoopCloser::FindLoop(KeyframeId id) const {
     if (joins_parts && place->seen_share < options_.min_share_to_join) continue;
     std::optional<LoopCorrection> correction = ComputeCorrection(map_, id, *place, options_.correction);
     if (!correction) continue;
-    if (!(correction->contradiction_sigmas <= options_.max_contradiction_sigmas * place->seen_share)) {
+    const bool has_depth = Baseline(map_.FindKeyframe(id)->features->calibration) > 0.0;
+    const double max_sigmas =
+        has_depth ? options_.max_contradiction_sigmas_with_depth : options_.max_contradiction_sigmas;
+    if (!(correction->contradiction_sigmas <= max_sigmas * place->seen_share)) {
       ++result.num_contradicted;
       continue;
     }

@@ -27,6 +27,9 @@ struct LoopCloserOptions {
   // 1500 standard deviations. Streets with the same cars parked at the same distances, 276 m and a right angle apart:
   // 5500.
   double max_contradiction_sigmas = 3000.0;
+  // The same where depth is measured, so that no scale slips: by 6 to 20. A lorry that was followed for long, and looks
+  // the same after each kilometer: 2700 to 4300.
+  double max_contradiction_sigmas_with_depth = 300.0;
   // Of a place in another part of the map: nothing is known between the two, so that nothing could contradict.
   double min_share_to_join = 0.1;
 

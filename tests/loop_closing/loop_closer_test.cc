@@ -182,25 +182,27 @@ TEST(LoopCloser, RefusesAThingThatStandsInTwoPlaces) {
 
 // Streets alike, with the same cars parked at the same distances: the place fits a pose, but the map knows better.
 TEST(LoopCloser, RefusesAPlaceThatContradictsTheMap) {
-  SyntheticWorld world(SensorType::kStereo, 0.3);
-  PlantedMap planted(world);
-  // One part: the map says that the camera went on, and that the second visit was elsewhere.
-  for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {k - 1}, 0);
-  for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {kVisit + k - 1}, 1, Away(1.0));
-  const auto find_loop = [&](double max_contradiction_sigmas) {
-    LoopCloserOptions options;
-    options.max_contradiction_sigmas = max_contradiction_sigmas;
-    LoopCloser closer(ShippedVocabulary(), options);
-    for (const MapDelta& delta : planted.deltas()) EXPECT_THAT(closer.ApplyDelta(delta), IsSuccess());
-    return closer.FindLoop({2 * kVisit - 1});
-  };
-  const LoopResult refused = find_loop(1.0), allowed = find_loop(LoopCloserOptions{}.max_contradiction_sigmas);
-  EXPECT_GT(refused.num_contradicted, 0);
-  EXPECT_FALSE(refused.matched.valid());
-  EXPECT_TRUE(refused.corrections.empty());
-  EXPECT_TRUE(refused.seen.empty());
-  EXPECT_EQ(allowed.num_contradicted, 0) << "nothing ties the two visits, so this map doesn't know";
-  EXPECT_TRUE(allowed.matched.valid());
+  for (const SensorType sensor : {SensorType::kMono, SensorType::kStereo}) {
+    SyntheticWorld world(sensor, 0.3);
+    PlantedMap planted(world);
+    // One part: the map says that the camera went on, and that the second visit was elsewhere.
+    for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {k - 1}, 0);
+    for (int64_t k = 0; k < kVisit; ++k) planted.Add(k, {kVisit + k - 1}, 1, Away(1.0));
+    const auto find_loop = [&](const LoopCloserOptions& options) {
+      LoopCloser closer(ShippedVocabulary(), options);
+      for (const MapDelta& delta : planted.deltas()) EXPECT_THAT(closer.ApplyDelta(delta), IsSuccess());
+      return closer.FindLoop({2 * kVisit - 1});
+    };
+    LoopCloserOptions strict;
+    (sensor == SensorType::kMono ? strict.max_contradiction_sigmas : strict.max_contradiction_sigmas_with_depth) = 1.0;
+    const LoopResult refused = find_loop(strict), allowed = find_loop({});
+    EXPECT_GT(refused.num_contradicted, 0);
+    EXPECT_FALSE(refused.matched.valid());
+    EXPECT_TRUE(refused.corrections.empty());
+    EXPECT_TRUE(refused.seen.empty());
+    EXPECT_EQ(allowed.num_contradicted, 0) << "nothing ties the two visits, so this map doesn't know";
+    EXPECT_TRUE(allowed.matched.valid());
+  }
 }
 
 // Of two parts, nothing is known that could contradict: the place itself must show enough of what should be there.
