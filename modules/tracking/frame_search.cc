@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <tuple>
 #include <utility>
 
 #include "core/quantile.h"
@@ -29,12 +31,33 @@ constexpr double kMaxDirectionSigma_rad = 0.1, kMaxVehicleSigma_px = 5.0;
 // Of the confirmed points that agree with one pose, those that agree with another of the same scene.
 constexpr double kMinShareOfConfirmed = 0.3;
 
+// Before a motion is known: how many poses on which points agree are tried, and pieces of the image in a row.
+constexpr int kMaxMotions = 3, kCellColumns = 20;
+
+// What makes the camera jump must have more than three times the points of what lets it go on, and more of the
+// confirmed ones, where so many tell. What moves by less in the image goes on.
+constexpr double kMinShareGoingOn = 0.3;
+constexpr int kTelling = 8;
+constexpr double kMaxOff_px = 10.0;
+
 // With depth, two frames by themselves are asked only where fewer points agree: that takes ten times as long as all the
 // tries, and more points are hardly wrong by chance.
 constexpr int kFewWithDepth = 100;
 
 // What the essential matrix of two frames may be off by, and a wall seen one window too far is not.
 constexpr double kMaxTurnFromPair_rad = 0.035;
+
+// How many square pieces of the image hold points of the frame.
+int NumCells(const TrackedFrame& frame) {
+  const double cell_px = static_cast<double>(frame.view->calibration().width_px) / kCellColumns;
+  std::set<std::pair<int, int>> cells;
+  for (size_t i = 0; i < frame.points.size(); ++i) {
+    if (!frame.points[i].valid()) continue;
+    const Keypoint& keypoint = frame.view->features().keypoints[i];
+    cells.emplace(static_cast<int>(keypoint.y_px / cell_px), static_cast<int>(keypoint.x_px / cell_px));
+  }
+  return static_cast<int>(cells.size());
+}
 
 double TurnBetween(const Rigid3& a, const Rigid3& b) { return LogSO3(a.rotation.conjugate() * b.rotation).norm(); }
 
@@ -62,8 +85,7 @@ std::optional<FoundFrame> FrameSearch::Follow() {
     is_clear = is_clear || TryAt(expected_.world_from_camera, widening, prior, best);
   }
   if (!is_clear) {
-    const std::optional<FoundFrame>& found = FindAnywhere();
-    is_clear = found && TryAt(found->frame.world_from_camera, 1.0, nullptr, best);
+    for (const FoundFrame& found : Anywhere()) is_clear |= TryAt(found.frame.world_from_camera, 1.0, nullptr, best);
   }
   const bool are_few = view_->baseline_m() == 0.0 || best.num_inliers < kFewWithDepth;
   if (!is_clear && are_few) is_clear = PoseByPair() && TryAt(*PoseByPair(), 1.0, nullptr, best);
@@ -72,8 +94,13 @@ std::optional<FoundFrame> FrameSearch::Follow() {
   return FoundFrame{std::move(*best.frame), is_wide, !is_clear};
 }
 
-const std::optional<FoundFrame>& FrameSearch::FindAnywhere() {
-  if (!anywhere_) anywhere_ = SearchAnywhere();
+std::optional<FoundFrame> FrameSearch::FindAnywhere() {
+  return Anywhere().empty() ? std::nullopt : std::optional(Anywhere().front());
+}
+
+// At first a row of posts, seen one too far, or a lorry may have more points than the rest of the scene.
+const std::vector<FoundFrame>& FrameSearch::Anywhere() {
+  if (!anywhere_) anywhere_ = SearchAnywhere(knows_motion() ? 1 : kMaxMotions);
   return *anywhere_;
 }
 
@@ -98,12 +125,27 @@ bool FrameSearch::IsAsExpected(const Rigid3& world_from_camera) const {
          ExpectedSigma_px() < (is_vehicle ? kMaxVehicleSigma_px : kMaxPriorSigma_px);
 }
 
-// More points agree; but something that fills the image and moves has hardly any confirmed ones.
-bool FrameSearch::IsBetter(int num_inliers, int num_confirmed, const Best& best) const {
-  if (by_confirmed_) return std::pair(num_confirmed, num_inliers) > std::pair(best.num_confirmed, best.num_inliers);
-  const int most = std::max(num_confirmed, best.num_confirmed), fewest = std::min(num_confirmed, best.num_confirmed);
-  if (most >= kMinConfirmed && fewest < kMinShareOfConfirmed * most) return num_confirmed == most;
-  return num_inliers > best.num_inliers;
+// More points agree; but something that fills the image and moves has hardly any confirmed ones, and makes the camera
+// jump. Before anything is known of the motion, the scene is what takes more of the image.
+bool FrameSearch::IsBetter(const Best& one, const Best& best) const {
+  if (by_confirmed_) {
+    return std::pair(one.num_confirmed, one.num_inliers) > std::pair(best.num_confirmed, best.num_inliers);
+  }
+  const auto [fewest, most] = std::minmax(one.num_confirmed, best.num_confirmed);
+  if (most >= kMinConfirmed && fewest < kMinShareOfConfirmed * most) return one.num_confirmed == most;
+  if (!knows_motion()) return std::pair(one.num_cells, one.num_inliers) > std::pair(best.num_cells, best.num_inliers);
+  if (one.goes_on != best.goes_on) {
+    const auto& [steady, jumping] = one.goes_on ? std::tie(one, best) : std::tie(best, one);
+    const bool is_confirmed = steady.num_confirmed >= std::max(kTelling, jumping.num_confirmed);
+    if (is_confirmed || steady.num_inliers >= kMinShareGoingOn * jumping.num_inliers) return one.goes_on;
+  }
+  return one.num_inliers > best.num_inliers;
+}
+
+// Whether a camera that moved as this one did may be here.
+bool FrameSearch::GoesOn(const Rigid3& world_from_camera) const {
+  const double off = (world_from_camera.translation - expected_.world_from_camera.translation).norm();
+  return off <= expected_.max_off || view_->calibration().fx_px * off <= kMaxOff_px * last_.MedianDepth();
 }
 
 // Whether the last frame's points, looked for around where they should be at this pose, show clearly what it is.
@@ -116,11 +158,9 @@ bool FrameSearch::TryAt(const Rigid3& world_from_camera, double widening, const 
   const PoseByConfirmed pose = OptimizeByConfirmed(replica_, options_.pose, prior, frame);
   const int num_inliers = pose.optimized.num_inliers;
   const Rigid3 found = frame.world_from_camera;
-  if (IsBetter(num_inliers, pose.num_confirmed, best)) {
-    best.num_inliers = num_inliers;
-    best.num_confirmed = pose.num_confirmed;
-    best.frame = std::move(frame);
-  }
+  const int num_cells = knows_motion() ? 0 : NumCells(frame);
+  Best one{std::move(frame), num_inliers, pose.num_confirmed, num_cells, GoesOn(found), best.num_tries};
+  if (IsBetter(one, best)) best = std::move(one);
   if (num_inliers < options_.min_last_matches / 2) return false;
   if (num_inliers > kMinShareOfMatches * num && num_inliers > kMinShareOfLast * last_.NumPoints()) return true;
   return prior != nullptr && IsAsExpected(found);
@@ -152,31 +192,47 @@ std::optional<Rigid3> FrameSearch::SearchByPair() const {
   return last_from_current ? std::optional(last_.world_from_camera * *last_from_current) : std::nullopt;
 }
 
-std::optional<FoundFrame> FrameSearch::SearchAnywhere() const {
+std::vector<FoundFrame> FrameSearch::SearchAnywhere(int max_num) const {
   KnownPoints points = LocalPoints(replica_, last_, options_.max_local_keyframes);
   for (const SeenPoint& point : last_.points) {
     if (point.valid()) points.emplace_back(point.id, point.landmark);
   }
   if (by_confirmed_) points = OnlyConfirmed(replica_, std::move(points));
-  TrackedFrame frame(view_);
-  MatchAnywhere(points, options_.matching, frame);
+  TrackedFrame matched(view_);
+  MatchAnywhere(points, options_.matching, matched);
   std::vector<PointPixel> pairs;
-  for (int i = 0; i < frame.view->size(); ++i) {
-    if (!frame.points[Index(i)].valid()) continue;
-    const PixelObservation seen = frame.view->observation(i);
-    pairs.push_back({frame.points[Index(i)].landmark.position_in_world, seen.pixel_px, seen.sigma_px});
+  std::vector<int> keypoints;  // by pair
+  for (int i = 0; i < view_->size(); ++i) {
+    if (!matched.points[Index(i)].valid()) continue;
+    const PixelObservation seen = view_->observation(i);
+    pairs.push_back({matched.points[Index(i)].landmark.position_in_world, seen.pixel_px, seen.sigma_px});
+    keypoints.push_back(i);
   }
-  const auto seed = static_cast<uint64_t>(frame.view->features().frame.value);
-  const auto pose = EstimateAbsolutePose(frame.view->calibration(), pairs, seed, {});
-  if (!pose) return std::nullopt;
-  frame.world_from_camera = pose->camera_from_world.Inverse();
-  // Most of what descriptors alone match may be wrong, and would pull the pose away before it is told apart.
-  for (size_t i = 0, pair = 0; i < frame.points.size(); ++i) {
-    if (frame.points[i].valid() && !pose->is_inlier[pair++]) frame.points[i] = {};
+  std::vector<FoundFrame> found;
+  while (static_cast<int>(found.size()) < max_num) {
+    const auto seed = static_cast<uint64_t>(view_->features().frame.value);
+    const auto pose = EstimateAbsolutePose(view_->calibration(), pairs, seed, {});
+    if (!pose) break;
+    TrackedFrame frame(view_);
+    frame.world_from_camera = pose->camera_from_world.Inverse();
+    // Most of what descriptors alone match may be wrong, and would pull the pose away before it is told apart.
+    size_t num_left = 0;
+    for (size_t pair = 0; pair < pairs.size(); ++pair) {
+      const int keypoint = keypoints[pair];
+      if (pose->is_inlier[pair]) {
+        frame.points[Index(keypoint)] = matched.points[Index(keypoint)];
+      } else {
+        pairs[num_left] = pairs[pair];
+        keypoints[num_left++] = keypoint;
+      }
+    }
+    pairs.resize(num_left);
+    keypoints.resize(num_left);
+    if (OptimizeFrame(options_.pose, frame) < options_.min_last_matches / 2) break;
+    const bool is_wide = IsWide(frame);
+    found.push_back({std::move(frame), is_wide, true});
   }
-  if (OptimizeFrame(options_.pose, frame) < options_.min_last_matches / 2) return std::nullopt;
-  const bool is_wide = IsWide(frame);
-  return FoundFrame{std::move(frame), is_wide, true};
+  return found;
 }
 
 }  // namespace tessera

@@ -1,8 +1,10 @@
 // One frame's search for its pose, from the last frame that was tracked.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "geometry/epipolar.h"
 #include "geometry/pose_optimization.h"
@@ -27,6 +29,8 @@ struct ExpectedFrame {
       way;                         // from the last frame, whatever the turn, world units; nullopt: no motion is known
   std::optional<PosePrior> prior;  // how well the position is known, if the camera was watched for long enough
   double turn_sigma_rad = 0.0;     // how well the turn is, an axis
+  // A camera that is farther from where it is expected has jumped, world units.
+  double max_off = std::numeric_limits<double>::infinity();
 };
 
 struct FoundFrame {
@@ -50,11 +54,12 @@ class FrameSearch {
   const Frame& view() const { return view_; }
 
   // The last frame's points, in windows around where the motion leads, ever wider; then from where the points around
-  // the last frame are found by descriptor alone, and from how the two frames as such show the motion. The first clear
-  // try ends it, else the best one counts, if any has enough inliers.
+  // the last frame are found by descriptor alone (before a motion is known, from three such poses), and from how the
+  // two frames as such show the motion. The first clear try ends it, else the best one counts, if any has enough
+  // inliers.
   std::optional<FoundFrame> Follow();
   // Without an expected pose: the points around the last frame, matched by descriptor alone. Computed once.
-  const std::optional<FoundFrame>& FindAnywhere();
+  std::optional<FoundFrame> FindAnywhere();
   // Where the last frame and this one by themselves show the camera, in world coordinates. Computed once.
   const std::optional<Rigid3>& PoseByPair();
   // Mono: whether the two frames by themselves show that the camera turned otherwise. To be asked where few points
@@ -69,12 +74,18 @@ class FrameSearch {
     std::optional<TrackedFrame> frame;
     int num_inliers = 0;
     int num_confirmed = 0;  // of these
+    int num_cells = 0;      // see NumCells(); 0: not needed
+    bool goes_on = false;
     int num_tries = 0;
   };
 
-  std::optional<FoundFrame> SearchAnywhere() const;
+  const std::vector<FoundFrame>& Anywhere();
+  bool knows_motion() const { return expected_.way.has_value(); }
+  // Poses on which points that are matched by descriptor alone agree, each without the points of those before.
+  std::vector<FoundFrame> SearchAnywhere(int max_num) const;
   std::optional<Rigid3> SearchByPair() const;
-  bool IsBetter(int num_inliers, int num_confirmed, const Best& best) const;
+  bool IsBetter(const Best& one, const Best& best) const;
+  bool GoesOn(const Rigid3& world_from_camera) const;
   bool TryAt(const Rigid3& world_from_camera, double widening, const PosePrior* prior, Best& best) const;
   double ExpectedSigma_px() const;
   bool IsAsExpected(const Rigid3& world_from_camera) const;
@@ -86,7 +97,7 @@ class FrameSearch {
   const MapReplica& replica_;
   const FrameSearchOptions& options_;
   const bool by_confirmed_;
-  std::optional<std::optional<FoundFrame>> anywhere_;
+  std::optional<std::vector<FoundFrame>> anywhere_;
   std::optional<std::optional<Rigid3>> by_pair_;
 };
 

@@ -18,18 +18,20 @@ bool HiddenScene::WasConfirmed(int64_t utime_us) const {
   return confirmed_us_ && utime_us - *confirmed_us_ <= kMoment_us;
 }
 
-bool HiddenScene::IsBehind(const StepPose& pose, int64_t utime_us, const std::function<bool()>& jumps) const {
-  if (is_hidden()) return pose.num_confirmed < kMinConfirmed || jumps();
+bool HiddenScene::IsBehind(const StepPose& pose, MotionAgreement agreement, int64_t utime_us) const {
+  const bool jumps = agreement == MotionAgreement::kJumps;
+  const bool goes_on = agreement == MotionAgreement::kGoesOn;
+  if (is_hidden()) return jumps || (pose.num_confirmed < kMinConfirmed && !goes_on);
   if (!WasConfirmed(utime_us)) return false;
   const bool contradicts =
       pose.num_confirmed_matches >= kTelling && pose.num_confirmed < kMinShare * pose.num_confirmed_matches;
   const bool are_gone = pose.num_confirmed < kMinShare * confirmed_share_ * pose.optimized.num_inliers;
-  return contradicts || (are_gone && jumps());
+  return (contradicts && !goes_on) || (are_gone && jumps);
 }
 
-bool HiddenScene::IsSure(const StepPose& pose, int64_t utime_us, const std::function<bool()>& jumps) const {
+bool HiddenScene::IsSure(const StepPose& pose, MotionAgreement agreement, int64_t utime_us) const {
   return pose.num_confirmed >= kMinConfirmed && pose.num_confirmed > kSureShare * pose.num_confirmed_matches &&
-         WasConfirmed(utime_us) && !jumps();
+         WasConfirmed(utime_us) && agreement != MotionAgreement::kJumps;
 }
 
 void HiddenScene::See(const StepPose& pose, int64_t utime_us) {

@@ -3,11 +3,12 @@
 // A bus that passes close by, or a person, fills the image within some frames. Its points are many and agree with one
 // another, so the pose by them is one of a camera that moves the other way. What tells it apart are the confirmed
 // points (confirmed_points.h), which stood still for long: they contradict that pose, or are gone from one moment to
-// the next while the camera would have jumped. From then on only they say when the scene is back.
+// the next while the camera would have jumped. From then on only they say when the scene is back. But a pose that a
+// camera which moved steadily goes on to is that of the scene: among vehicles that drive as fast as it does, confirmed
+// points may be theirs.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 
 #include "tracking/step_pose.h"
@@ -21,11 +22,10 @@ class HiddenScene {
   // Whether confirmed points agreed with a pose a moment ago.
   bool WasConfirmed(int64_t utime_us) const;
 
-  // Whether this pose is that of something else than the scene. `jumps`: whether the camera can't have come there by
-  // how it moved a moment ago.
-  bool IsBehind(const StepPose& pose, int64_t utime_us, const std::function<bool()>& jumps) const;
+  // Whether this pose is that of something else than the scene.
+  bool IsBehind(const StepPose& pose, MotionAgreement agreement, int64_t utime_us) const;
   // Whether so many confirmed points agree that the pose is right, however much of the scene is hidden.
-  bool IsSure(const StepPose& pose, int64_t utime_us, const std::function<bool()>& jumps) const;
+  bool IsSure(const StepPose& pose, MotionAgreement agreement, int64_t utime_us) const;
 
   // At each frame that shows something else, or nothing; longer than kMaxHidden_us, what hides the scene is the scene.
   void Hide(int64_t utime_us) { hidden_us_ = utime_us; }

@@ -16,12 +16,15 @@
 namespace tessera {
 namespace {
 
-constexpr double kMinCoverage = 0.4;     // see Coverage(): of a pose that no try has found clearly
-constexpr double kLongLost_s = 2.0;      // since the last pose: the camera may be where nothing is known of
-constexpr double kMaxStanding_px = 3.0;  // in kDriftInterval_s, as noise has it
-constexpr double kExact = 1e12;          // information about a pose that is taken as it is
-constexpr double kMinJump_px = 10.0;     // in the image
-constexpr int kFewInliers = 100;         // that agree with a pose: what two frames as such show counts more
+constexpr double kMinCoverage = 0.4;            // see Coverage(): of a pose that no try has found clearly
+constexpr double kLongLost_s = 2.0;             // since the last pose: the camera may be where nothing is known of
+constexpr double kMaxSigmas = 5.0;              // an axis, of a motion that goes on
+constexpr double kMaxAcceleration_mps2 = 50.0;  // of any camera
+constexpr double kOnItsWay_s = 1.0;             // since the last pose: it moves as it did
+constexpr double kMaxStanding_px = 3.0;         // in kDriftInterval_s, as noise has it
+constexpr double kExact = 1e12;                 // information about a pose that is taken as it is
+constexpr double kMinJump_px = 10.0;            // in the image
+constexpr int kFewInliers = 100;                // that agree with a pose: what two frames as such show counts more
 constexpr double kDriftInterval_s = 0.1;
 constexpr int kNewsOfBody = 10;          // pieces of the image: the mapper is to hear of it now
 constexpr double kPairSigmaShare = 0.2;  // of a step that two frames by themselves have shown
@@ -124,13 +127,16 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   return result;
 }
 
-// A pose by points that moved with the camera was wrong, and so is what it said of motion and of what stands still.
+// A pose by points that moved with the camera was wrong, and so is what it said of motion and of what stands still. One
+// that moved steadily was not by them.
 void MapTracker::WatchBody(const FeatureFrame& features) {
   if (features.frame == body_frame_) return;
   body_frame_ = features.frame;
   const int num_before = own_body_.num_found();
   own_body_.Add(features);
   if (own_body_.num_found() == num_before) return;
+  const std::optional<MotionPrediction> motion = motion_.Predict(kDriftInterval_s);
+  if (motion && motion->is_steady) return;
   scene_ = {};
   ForgetMotion();
 }
@@ -235,6 +241,11 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
         std::sqrt(motion.covariance.trace() / 3.0) / motion.last_from_current.translation.norm();
     expected.way = {step->world_from_reference.scale * interval_s * motion_.velocity(), direction_sigma_rad};
     if (motion.is_learned) expected.prior = step->Prior();
+    if (motion.is_steady) {
+      expected.max_off = kMaxSigmas * step->world_from_reference.scale * std::sqrt(motion.covariance.trace());
+    } else if (view.baseline_m() > 0.0) {
+      expected.max_off = kMaxAcceleration_mps2 * interval_s * interval_s;
+    }
     expected.turn_sigma_rad = motion.turn_sigma_rad;
   }
   return expected;
@@ -243,7 +254,7 @@ ExpectedFrame MapTracker::Expect(const FrameView& view) const {
 // The frame becomes the last one if its pose can be found in the map around that one.
 bool MapTracker::Localize(const CapturedFrame& captured, FrameSearch& search) {
   std::optional<FoundFrame> found;
-  if (!lost_since_us_) found = search.Follow();
+  if (!lost_since_us_ || IsOnItsWay(*captured.view)) found = search.Follow();
   if (!found) found = search.FindAnywhere();
   if (!found) return false;
   TrackedFrame& frame = found->frame;
@@ -254,20 +265,27 @@ bool MapTracker::Localize(const CapturedFrame& captured, FrameSearch& search) {
   const StepPose pose = OptimizeWithMotion(frame);
   if (pose.optimized.num_inliers < MinInliers(num_matches)) return false;
   const int64_t utime_us = frame.view->features().utime_us;
-  const auto jumps = [&] { return Jumps(*frame.view, frame.world_from_camera, pose.optimized.information); };
-  if (IsFollowed() && scene_.IsBehind(pose, utime_us, jumps)) {
+  const MotionAgreement agreement = AgreementOf(*frame.view, frame.world_from_camera, pose.optimized.information);
+  if (IsFollowed() && scene_.IsBehind(pose, agreement, utime_us)) {
     scene_.Hide(utime_us);
     return false;
   }
   // Soon after a loss the greater number of inliers says as much.
   const bool is_doubtful =
       lost_since_us_ ? SecondsBetween(*last_->frame.view, *frame.view) > kLongLost_s : found->is_doubtful;
-  if (is_doubtful && !scene_.IsSure(pose, utime_us, jumps) && Coverage(around, frame) < kMinCoverage) return false;
+  if (is_doubtful && !scene_.IsSure(pose, agreement, utime_us) && Coverage(around, frame) < kMinCoverage) return false;
   const bool are_few = pose.optimized.num_inliers < kFewInliers;
   if (!lost_since_us_ && are_few && search.PairContradicts(frame.world_from_camera)) return false;
   const int num_outliers = num_matches - frame.NumPoints();
   Remember(std::move(frame), pose, found->is_wide, num_outliers);
   return true;
+}
+
+// Whether the camera moved steadily when it was lost a moment ago: it isn't far from where that leads.
+bool MapTracker::IsOnItsWay(const FrameView& view) const {
+  if (SecondsBetween(*last_->frame.view, view) > kOnItsWay_s) return false;
+  const std::optional<ExpectedStep> step = ExpectStep(view);
+  return step && step->motion.is_steady;
 }
 
 // Points that the last frame saw for the first time are no measure: they may be on something that moves.
@@ -277,15 +295,18 @@ int MapTracker::MinInliers(int num_matches) const {
   return std::max(options_.min_inliers, static_cast<int>(options_.min_share_of_last * num_last));
 }
 
-// Whether a camera that turned so can't have come here by how it moved a moment ago. `information`: about the pose.
-bool MapTracker::Jumps(const FrameView& view, const Rigid3& world_from_camera, const Matrix6d& information) const {
+// Of a camera that turned so, to how it moved a moment ago. `information`: about the pose.
+MotionAgreement MapTracker::AgreementOf(const FrameView& view, const Rigid3& world_from_camera,
+                                        const Matrix6d& information) const {
   const Rigid3 last_from_current = last_->frame.world_from_camera.Inverse() * world_from_camera;
   const std::optional<ExpectedStep> expected = ExpectStep(view, last_from_current.rotation);
-  if (!expected || !expected->motion.is_learned) return false;
+  if (!expected || !expected->motion.is_learned) return MotionAgreement::kOpen;
+  if (!IsJump(expected->motion, expected->MotionTo(world_from_camera), expected->CovarianceBy(information))) {
+    return expected->motion.is_steady ? MotionAgreement::kGoesOn : MotionAgreement::kOpen;
+  }
   const double shift = (world_from_camera.translation - expected->WorldFromCamera().translation).norm();
   const bool is_seen = view.calibration().fx_px * shift > kMinJump_px * last_->frame.MedianDepth();
-  return is_seen &&
-         IsJump(expected->motion, expected->MotionTo(world_from_camera), expected->CovarianceBy(information));
+  return is_seen ? MotionAgreement::kJumps : MotionAgreement::kOpen;
 }
 
 StepPose MapTracker::OptimizeWithMotion(TrackedFrame& frame) const {
@@ -335,7 +356,8 @@ bool MapTracker::FollowPair(FrameSearch& search, std::vector<KeyframeObservation
   const std::optional<Rigid3> world_from_camera = search.PoseByPair();
   if (!world_from_camera) return false;
   const int64_t utime_us = search.view()->features().utime_us;
-  if (scene_.WasConfirmed(utime_us) && Jumps(*search.view(), *world_from_camera, kExact * Matrix6d::Identity())) {
+  if (scene_.WasConfirmed(utime_us) &&
+      AgreementOf(*search.view(), *world_from_camera, kExact * Matrix6d::Identity()) == MotionAgreement::kJumps) {
     scene_.Hide(utime_us);
     return false;
   }

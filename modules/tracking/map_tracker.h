@@ -114,9 +114,11 @@ class MapTracker {
   bool Localize(const CapturedFrame& captured, FrameSearch& search);
   StepPose OptimizeWithMotion(TrackedFrame& frame) const;
   int MinInliers(int num_matches) const;
+  bool IsOnItsWay(const FrameView& view) const;
   // The motion of a moment ago still says where the camera may be.
   bool IsFollowed() const { return !lost_since_us_ || scene_.is_hidden(); }
-  bool Jumps(const FrameView& view, const Rigid3& world_from_camera, const Matrix6d& information) const;
+  MotionAgreement AgreementOf(const FrameView& view, const Rigid3& world_from_camera,
+                              const Matrix6d& information) const;
   std::optional<CaptureTimes::Step> StepTo(const TrackedFrame& frame) const;
   void Remember(TrackedFrame frame, const StepPose& pose, bool is_wide_step, int num_outliers);
   bool FollowPair(FrameSearch& search, std::vector<KeyframeObservation>& keyframes);

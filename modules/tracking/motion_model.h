@@ -72,6 +72,13 @@ class MotionModel {
 // an axis off.
 bool IsJump(const MotionPrediction& prediction, const Rigid3& motion, const Eigen::Matrix3d& covariance);
 
+// A pose against how the camera moved a moment ago.
+enum class MotionAgreement {
+  kOpen,    // nothing says more
+  kGoesOn,  // a camera that moved steadily does so still
+  kJumps    // the camera can't have come there
+};
+
 // What images say about a step against what was predicted.
 enum class StepEvidence {
   kStrong,  // they fix the step, or nothing steady was predicted

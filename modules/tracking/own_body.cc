@@ -25,13 +25,14 @@ constexpr double kFarther = 1.2;                     // times as far
 // A mark that stands still where the scene would move is worth four that went: half of them aren't found again.
 constexpr int kStillGain = 4, kOpenGain = 2, kGoneLoss = 1;
 constexpr int kBodyScore = 24, kMaxScore = 40, kSceneScore = -100, kMinScore = -300;
-constexpr int kMinCells = 8;  // of a body
-constexpr int kPlain = 30;    // cells nearer than all that moves: one look is enough
+constexpr double kReach_m = 8.0;  // of a body; what is farther and stands still drives in front
+constexpr int kMinCells = 8;      // of a body
+constexpr int kPlain = 30;        // cells nearer than all that moves: one look is enough
 
 }  // namespace
 
 bool OwnBody::Scene::IsNearerThanMost(double depth_m) const {
-  if (stands || depth_m == 0.0) return false;
+  if (stands || depth_m == 0.0 || depth_m > kReach_m) return false;
   const auto farther = std::upper_bound(gone_depths_m.begin(), gone_depths_m.end(), kFarther * depth_m);
   return 2 * (gone_depths_m.end() - farther) > num_gone;
 }
@@ -39,6 +40,7 @@ bool OwnBody::Scene::IsNearerThanMost(double depth_m) const {
 bool OwnBody::Scene::Contradicts(double depth_m) const {
   if (stands) return false;
   if (depth_m == 0.0) return turns;
+  if (depth_m > kReach_m) return false;
   const auto nearer = std::lower_bound(gone_depths_m.begin(), gone_depths_m.end(), depth_m / kFarther);
   const bool is_behind_most = 2 * (nearer - gone_depths_m.begin()) > num_gone;
   return IsNearerThanMost(depth_m) || (turns && !is_behind_most);

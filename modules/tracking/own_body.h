@@ -6,6 +6,7 @@
 // far. So whatever still stands where it was is of the body, if
 //   - hardly anything else moved only a little (the camera turned), or
 //   - most of what moved is farther away.
+// What is farther than anything that carries a camera is none of it: a lorry that drives in front.
 // While the camera stands and a bus goes by, the scene stands still, too: but where it stands, other things were seen
 // to come and go before.
 #pragma once

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
+
 #include "support/matchers.h"
 #include "support/synthetic_world.h"
 
@@ -84,6 +87,66 @@ TEST_F(FrameSearchTest, DoesNotBelieveATurnThatIsNotSteady) {
   const auto found = Follow(Faded(Take(), 6), expected);
   ASSERT_TRUE(found.has_value());
   EXPECT_TRUE(found->is_doubtful);
+}
+
+// A camera went on, and a lorry that drives in front has most of the points: as these show it, the camera stands.
+class LorryInFront : public testing::Test {
+ protected:
+  using Place = std::function<bool(const Keypoint&)>;
+
+  // What the camera sees from its new place, one in `scene_every` keypoints, but where the lorry is.
+  FeatureFrame Take(const Place& is_lorry, size_t scene_every) {
+    FeatureFrame seen = world_.Take(1, truth_).features, taken = seen;
+    taken.keypoints.clear();
+    taken.descriptors.clear();
+    const auto add = [&taken](const FeatureFrame& from, size_t i) {
+      taken.keypoints.push_back(from.keypoints[i]);
+      taken.descriptors.push_back(from.descriptors[i]);
+    };
+    for (size_t i = 0; i < seen.keypoints.size(); i += scene_every) {
+      if (!is_lorry(seen.keypoints[i])) add(seen, i);
+    }
+    for (size_t i = 0; i < before_.keypoints.size(); ++i) {
+      if (is_lorry(before_.keypoints[i])) add(before_, i);
+    }
+    return taken;
+  }
+  std::optional<FoundFrame> Follow(const FeatureFrame& features, const ExpectedFrame& expected) const {
+    return FrameSearch(ViewOf(features), last_, expected, replica_, options_).Follow();
+  }
+
+  SyntheticWorld world_{SensorType::kStereo, 0.3};
+  const TrackedFrame last_ = world_.TrackedAt(0);
+  const FeatureFrame before_ = world_.Take(0).features;
+  const Rigid3 truth_ = SyntheticWorld::Pose(3.0);
+  const FrameSearchOptions options_;
+  const MapReplica replica_;
+};
+
+TEST_F(LorryInFront, APoseThatGoesOnWinsAgainstMorePointsThatMakeTheCameraJump) {
+  int number = 0;
+  const FeatureFrame features = Take([&number](const Keypoint&) { return ++number % 3 != 0; }, 1);
+  const DirectionPrior way{truth_.translation - last_.world_from_camera.translation, 0.2};
+  ExpectedFrame expected{.world_from_camera = truth_, .way = way};
+  const auto carried = Follow(features, expected);
+  expected.max_off = 0.1;
+  const auto steady = Follow(features, expected);
+  ASSERT_TRUE(carried.has_value() && steady.has_value());
+  EXPECT_THAT(carried->frame.world_from_camera, IsNear(last_.world_from_camera, 0.05));
+  EXPECT_THAT(steady->frame.world_from_camera, IsNear(truth_, 0.05));
+}
+
+TEST_F(LorryInFront, BeforeAMotionIsKnownTheSceneIsWhatTakesMoreOfTheImage) {
+  const CameraCalibration camera = world_.calibration();
+  const auto is_lorry = [&camera](const Keypoint& keypoint) {
+    return keypoint.x_px < 0.3F * static_cast<float>(camera.width_px);
+  };
+  const FeatureFrame features = Take(is_lorry, 3);
+  const auto num_lorry = std::ranges::count_if(features.keypoints, is_lorry);
+  ASSERT_GT(num_lorry, static_cast<int64_t>(features.keypoints.size()) - num_lorry) << "it has most of the points";
+  const auto found = Follow(features, {.world_from_camera = last_.world_from_camera});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_THAT(found->frame.world_from_camera, IsNear(truth_, 0.05));
 }
 
 TEST_F(FrameSearchTest, TwoFramesByThemselvesContradictAnotherTurn) {

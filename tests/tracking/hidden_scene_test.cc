@@ -16,8 +16,8 @@ StepPose PoseWith(int num_confirmed, int num_confirmed_matches) {
   pose.num_confirmed_matches = num_confirmed_matches;
   return pose;
 }
-bool Jumps() { return true; }
-bool GoesOn() { return false; }
+constexpr MotionAgreement kJumps = MotionAgreement::kJumps, kOpen = MotionAgreement::kOpen,
+                          kGoesOn = MotionAgreement::kGoesOn;
 
 class HiddenSceneTest : public testing::Test {
  protected:
@@ -26,27 +26,34 @@ class HiddenSceneTest : public testing::Test {
 };
 
 TEST_F(HiddenSceneTest, ConfirmedPointsThatContradictAPoseHideIt) {
-  EXPECT_TRUE(scene_.IsBehind(PoseWith(5, 20), kSecond, GoesOn));
-  EXPECT_FALSE(scene_.IsBehind(PoseWith(40, 100), kSecond, Jumps)) << "a jerk, on which they agree";
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(5, 20), kOpen, kSecond));
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(40, 100), kJumps, kSecond)) << "a jerk, on which they agree";
+}
+
+// Among vehicles that drive as fast, many confirmed points are theirs.
+TEST_F(HiddenSceneTest, ASteadyMotionThatGoesOnCountsMore) {
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(5, 20), kGoesOn, kSecond));
+  scene_.Hide(2 * kSecond);
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(20, 20), kGoesOn, 4 * kSecond));
 }
 
 TEST_F(HiddenSceneTest, WhereTheyAreGoneAJumpHidesIt) {
-  EXPECT_TRUE(scene_.IsBehind(PoseWith(2, 2), kSecond, Jumps));
-  EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 25), kSecond, Jumps)) << "few of many points, where they were the half";
-  EXPECT_FALSE(scene_.IsBehind(PoseWith(2, 2), kSecond, GoesOn)) << "a turn into what is new";
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(2, 2), kJumps, kSecond));
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 25), kJumps, kSecond)) << "few of many points, where they were the half";
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(2, 2), kOpen, kSecond)) << "a turn into what is new";
 }
 
 TEST_F(HiddenSceneTest, WithoutConfirmedPointsAMomentAgoNothingIsSaid) {
-  EXPECT_FALSE(HiddenScene().IsBehind(PoseWith(0, 0), kSecond, Jumps)) << "a map that has just begun";
-  EXPECT_FALSE(scene_.IsBehind(PoseWith(0, 0), 3 * kSecond, Jumps));
+  EXPECT_FALSE(HiddenScene().IsBehind(PoseWith(0, 0), kJumps, kSecond)) << "a map that has just begun";
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(0, 0), kJumps, 3 * kSecond));
 }
 
 TEST_F(HiddenSceneTest, IsBackWhenManyConfirmedPointsAgreeAndTheCameraIsWhereItWas) {
   scene_.Hide(2 * kSecond);
   ASSERT_TRUE(scene_.is_hidden());
-  EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 20), 4 * kSecond, GoesOn));
-  EXPECT_TRUE(scene_.IsBehind(PoseWith(40, 45), 4 * kSecond, Jumps));
-  EXPECT_FALSE(scene_.IsBehind(PoseWith(40, 45), 4 * kSecond, GoesOn));
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 20), kOpen, 4 * kSecond));
+  EXPECT_TRUE(scene_.IsBehind(PoseWith(40, 45), kJumps, 4 * kSecond));
+  EXPECT_FALSE(scene_.IsBehind(PoseWith(40, 45), kOpen, 4 * kSecond));
 }
 
 TEST_F(HiddenSceneTest, MayBeHiddenAgainForASecond) {
@@ -61,11 +68,11 @@ TEST_F(HiddenSceneTest, MayBeHiddenAgainForASecond) {
 }
 
 TEST_F(HiddenSceneTest, MostOfManyConfirmedPointsLeaveNoDoubt) {
-  EXPECT_TRUE(scene_.IsSure(PoseWith(30, 33), kSecond, GoesOn));
-  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 33), kSecond, Jumps));
-  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 60), kSecond, GoesOn));
-  EXPECT_FALSE(scene_.IsSure(PoseWith(20, 20), kSecond, GoesOn));
-  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 33), 3 * kSecond, GoesOn));
+  EXPECT_TRUE(scene_.IsSure(PoseWith(30, 33), kOpen, kSecond));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 33), kJumps, kSecond));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 60), kOpen, kSecond));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(20, 20), kOpen, kSecond));
+  EXPECT_FALSE(scene_.IsSure(PoseWith(30, 33), kOpen, 3 * kSecond));
 }
 
 }  // namespace

@@ -257,6 +257,37 @@ TEST(MapTracker, FindsItselfAgainAfterBlindFrames) {
   EXPECT_EQ(states[11], TrackingState::kTracked);
 }
 
+// Where everything looks alike, nothing is found by descriptors alone; but a camera that moved steadily isn't far from
+// where that leads.
+TEST(MapTracker, IsFoundOnItsWayAfterAMomentThoughAllLooksAlike) {
+  constexpr size_t kNumKinds = 50;  // of points
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  Mapper mapper{MapperOptions{}};
+  std::vector<TrackingState> states;
+  for (int64_t step = 0; step < 22; ++step) {
+    SyntheticWorld::Picture picture = world.Take(step, world.Pose(0.5 * static_cast<double>(step)));
+    FeatureFrame& features = picture.features;
+    for (size_t i = 0; i < features.descriptors.size(); ++i) {
+      std::mt19937_64 generator(picture.points[i] % kNumKinds);
+      features.descriptors[i] = {generator(), generator(), generator(), generator()};
+    }
+    if (step == 18 || step == 19) {
+      features.keypoints.clear();
+      features.descriptors.clear();
+    }
+    const MapTrackingResult result = tracker.Track(features);
+    states.push_back(result.pose.state);
+    for (const KeyframeObservation& keyframe : result.keyframes) {
+      ASSERT_THAT(tracker.ApplyDelta(mapper.Process(keyframe)), IsSuccess());
+    }
+  }
+  EXPECT_EQ(states[17], TrackingState::kTracked);
+  EXPECT_EQ(states[19], TrackingState::kLost);
+  EXPECT_EQ(states[20], TrackingState::kTracked);
+  EXPECT_EQ(states[21], TrackingState::kTracked);
+}
+
 // A camera that suddenly goes half as far as a moment before. Where depth is measured, a jerk by few pixels is none.
 TEST(MapTracker, AStepThatContradictsTheMotionIsDoubtfulIfItShowsInTheImage) {
   for (const double step_length : {1.2, 0.2}) {

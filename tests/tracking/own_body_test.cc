@@ -90,6 +90,12 @@ TEST(OwnBody, TheSceneIsNoneOfIt) {
   }
 }
 
+// As that of a lorry that drives in front for long.
+TEST(OwnBody, WhatIsOutOfReachIsNoneOfIt) {
+  const SyntheticWorld world(SensorType::kRgbd);
+  EXPECT_EQ(Drive(SensorType::kRgbd, BodyIn(world.calibration(), 12.0), 0.5, 0.3, 60).num_found(), 0);
+}
+
 TEST(OwnBody, NothingIsKnownWhileTheCameraStands) {
   const SyntheticWorld world(SensorType::kRgbd);
   const FeatureFrame body = BodyIn(world.calibration(), 0.6);
