@@ -19,14 +19,13 @@ constexpr double kOpenRoughness = 0.4;  // of the road in open stretches; elsewh
 class CountryBuilder {
  public:
   CountryBuilder(const CountryPlan& plan, const Terrain& terrain, uint32_t seed, World& world)
-      : plan_(plan), terrain_(terrain), seed_(seed), builder_(world), random_(HashOf(seed, 71)) {
+      : plan_(plan), terrain_(terrain), seed_(seed), builder_(world), random_(HashOf(seed, 71)), line_(plan.road) {
     for (const Eigen::Vector2d& p : plan.road) middle_ += p / static_cast<double>(plan.road.size());
     for (const Eigen::Vector2d& p : plan.road) reach_ = std::max(reach_, (p - middle_).norm());
-    posts_ = Resample(plan.road, 1.0);
     for (const Stretch& stretch : plan.stretches) {
       if (stretch.kind != Stretch::Kind::kOpen) continue;
       for (double along = stretch.from_m; along < stretch.to_m + 8.0; along += 8.0) {
-        open_.push_back(posts_[PostAt(std::min(along, stretch.to_m))]);
+        open_.push_back(line_.At(std::min(along, stretch.to_m)));
       }
     }
     for (int i = 0; i < kNumTreeKinds; ++i) {
@@ -58,17 +57,6 @@ class CountryBuilder {
   }
 
  private:
-  size_t PostAt(double along_m) const {
-    return std::min(static_cast<size_t>(std::max(0.0, along_m)), posts_.size() - 1);
-  }
-  Eigen::Vector2d AlongAt(double along_m) const {
-    const size_t post = PostAt(along_m);
-    return (posts_[std::min(post + 1, posts_.size() - 1)] - posts_[post > 0 ? post - 1 : 0]).normalized();
-  }
-  // The position at this distance to the right of the road's middle.
-  Eigen::Vector2d Beside(double along_m, double right_m) const {
-    return posts_[PostAt(along_m)] + right_m * RightOf(AlongAt(along_m));
-  }
   bool IsFree(const Eigen::Vector2d& p, double gap_m) const {
     return terrain_.road().DistanceToStreet(p) >= kRoadsideM + gap_m && !IsOpen(p, kOpenM);
   }
@@ -88,7 +76,7 @@ class CountryBuilder {
       for (const double side : {1.0, -1.0}) {
         const double right = 6.5 + 30.0 * random_.Uniform(0.0, 1.0) * random_.Uniform(0.0, 1.0);
         const auto kind = static_cast<size_t>(random_.Index(kNumTreeKinds));
-        Plant(trees_[kind], Beside(along, side * right));
+        Plant(trees_[kind], line_.Beside(along, side * right));
       }
     }
   }
@@ -96,7 +84,7 @@ class CountryBuilder {
   void PlantAvenue(const Stretch& stretch) {
     const TreeKind& kind = trees_[static_cast<size_t>(random_.Index(kNumTreeKinds))];
     for (double along = stretch.from_m; along < stretch.to_m; along += 11.0) {
-      for (const double side : {1.0, -1.0}) Plant(kind, Beside(along, 6.2 * side));
+      for (const double side : {1.0, -1.0}) Plant(kind, line_.Beside(along, 6.2 * side));
     }
   }
 
@@ -107,20 +95,20 @@ class CountryBuilder {
       if (draw < 0.45) {
         PutHedge(along, side * random_.Uniform(6.5, 9.0));
       } else if (draw < 0.65) {
-        PutPost(Beside(along, 5.6 * side));
+        PutPost(line_.Beside(along, 5.6 * side));
       } else if (draw < 0.93) {
         const auto kind = static_cast<size_t>(random_.Index(kNumTreeKinds));
-        Plant(trees_[kind], Beside(along, side * random_.Uniform(6.5, 22.0)));
+        Plant(trees_[kind], line_.Beside(along, side * random_.Uniform(6.5, 22.0)));
       } else {
-        PutBarn(Beside(along, side * random_.Uniform(18.0, 30.0)), AlongAt(along));
+        PutBarn(line_.Beside(along, side * random_.Uniform(18.0, 30.0)), line_.AheadAt(along));
       }
     }
   }
 
   void PutHedge(double along_m, double right_m) {
     const double half = random_.Uniform(2.0, 5.0);
-    const Eigen::Vector2d middle = Beside(along_m, right_m);
-    const Eigen::Vector2d ahead = AlongAt(along_m);
+    const Eigen::Vector2d middle = line_.Beside(along_m, right_m);
+    const Eigen::Vector2d ahead = line_.AheadAt(along_m);
     const bool is_hedge = random_.Chance(0.6);
     const double height = random_.Uniform(0.9, 1.9);
     const PaintSpec spec{is_hedge ? Material::kHedge : Material::kFence, random_.Next(), 2.0 * half, height, 0.03};
@@ -213,9 +201,9 @@ class CountryBuilder {
   uint32_t seed_;
   WorldBuilder builder_;
   Random random_;
+  MeterLine line_;  // the road's middle
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
   double reach_ = 0.0;  // from the middle to the farthest point of the road
-  Polyline posts_;      // of the road's middle line, every meter
   Polyline open_;       // of open stretches, every 8 m
   std::vector<TreeKind> trees_;
   std::map<std::tuple<double, int, int>, int32_t> fields_;  // by tone and phase

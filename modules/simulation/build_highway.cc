@@ -1,3 +1,4 @@
+// What stands along a motorway.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,9 +20,9 @@ constexpr double kRidgeM = 700.0;  // from the road to the nearest ridge
 class HighwayBuilder {
  public:
   HighwayBuilder(const HighwayPlan& plan, uint32_t seed, World& world)
-      : seed_(seed), builder_(world), random_(HashOf(seed, 41)), posts_(Resample(plan.middle, 1.0)) {
-    for (const Eigen::Vector2d& p : posts_) middle_ += p / static_cast<double>(posts_.size());
-    for (const Eigen::Vector2d& p : posts_) reach_ = std::max(reach_, (p - middle_).norm());
+      : seed_(seed), builder_(world), random_(HashOf(seed, 41)), line_(plan.middle) {
+    for (const Eigen::Vector2d& p : line_.posts()) middle_ += p / static_cast<double>(line_.posts().size());
+    for (const Eigen::Vector2d& p : line_.posts()) reach_ = std::max(reach_, (p - middle_).norm());
     for (TreeKind& kind : trees_) {
       const double crown = random_.Uniform(3.0, 6.5);
       kind = MakeTreeKind(crown, random_.Uniform(0.3, 2.5), 0.03 * crown, random_, builder_);
@@ -32,30 +33,18 @@ class HighwayBuilder {
     BuildGround();
     BuildRails();
     BuildDelineators();
-    for (double along = 0.0; along < length_m();) along = BuildRoadside(along, random_.Uniform(150.0, 500.0));
-    for (double along = 250.0; along < length_m(); along += random_.Uniform(300.0, 600.0)) PutSign(along);
-    for (double along = 500.0; along < length_m(); along += random_.Uniform(700.0, 1300.0)) BuildBridge(along);
+    for (double along = 0.0; along < line_.length_m();) along = BuildRoadside(along, random_.Uniform(150.0, 500.0));
+    for (double along = 250.0; along < line_.length_m(); along += random_.Uniform(300.0, 600.0)) PutSign(along);
+    for (double along = 500.0; along < line_.length_m(); along += random_.Uniform(700.0, 1300.0)) BuildBridge(along);
     AddRidges(middle_, reach_ + kRidgeM, random_, builder_);
     AddClouds(middle_, HashOf(seed_, 6), builder_);
   }
 
  private:
-  double length_m() const { return static_cast<double>(posts_.size() - 1); }
-  size_t PostAt(double along_m) const {
-    return std::min(static_cast<size_t>(std::max(0.0, along_m)), posts_.size() - 1);
-  }
-  Eigen::Vector2d AheadAt(double along_m) const {
-    const size_t post = PostAt(along_m);
-    return (posts_[std::min(post + 1, posts_.size() - 1)] - posts_[post > 0 ? post - 1 : 0]).normalized();
-  }
-  Eigen::Vector2d Beside(double along_m, double right_m) const {
-    return posts_[PostAt(along_m)] + right_m * RightOf(AheadAt(along_m));
-  }
-
   void BuildGround() {
     const StreetMap& road = *builder_.world().streets;
-    Eigen::Vector2d low = posts_.front(), high = posts_.front();
-    for (const Eigen::Vector2d& p : posts_) {
+    Eigen::Vector2d low = line_.posts().front(), high = line_.posts().front();
+    for (const Eigen::Vector2d& p : line_.posts()) {
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
@@ -88,22 +77,23 @@ class HighwayBuilder {
     for (int32_t& post : posts) post = builder_.AddPaint({Material::kBark, random_.Next(), 0.12, 0.75, 0.02});
     const auto any_of = [this](const auto& kinds) { return kinds[static_cast<size_t>(random_.Index(kNumKinds))]; };
     for (const double right : {-kRailM, -0.6, 0.6, kRailM}) {
-      for (double along = 0.0; along + kPostsM < length_m(); along += kPostsM) {
-        const Eigen::Vector2d from = Beside(along, right), to = Beside(along + kPostsM, right);
+      for (double along = 0.0; along + kPostsM < line_.length_m(); along += kPostsM) {
+        const Eigen::Vector2d from = line_.Beside(along, right), to = line_.Beside(along + kPostsM, right);
         Surface rail = builder_.Wall(from, to, 0.44, 0.31, any_of(beams));
         rail.two_sided = true;
         builder_.Add(rail);
         const int32_t post = any_of(posts);
-        builder_.Add(builder_.Box(from, AheadAt(along), 0.06, 0.06, 0.0, 0.78, post, post));
+        builder_.Add(builder_.Box(from, line_.AheadAt(along), 0.06, 0.06, 0.0, 0.78, post, post));
       }
     }
   }
 
   void BuildDelineators() {
     const int32_t paint = builder_.AddPaint({Material::kSign, HashOf(seed_, 9), 0.14, 1.0, 0.01});
-    for (double along = 25.0; along < length_m(); along += 50.0) {
+    for (double along = 25.0; along < line_.length_m(); along += 50.0) {
       for (const double right : {-kRailM - 0.4, kRailM + 0.4}) {
-        builder_.Add(builder_.Box(Beside(along, right), AheadAt(along), 0.07, 0.07, 0.0, 1.05, paint, paint));
+        builder_.Add(
+            builder_.Box(line_.Beside(along, right), line_.AheadAt(along), 0.07, 0.07, 0.0, 1.05, paint, paint));
       }
     }
   }
@@ -117,7 +107,7 @@ class HighwayBuilder {
           PlantTrees(from_m, to_m, side, 60.0);
           break;
         case 1:
-          BuildBarrier(from_m, std::min(to_m, length_m() - kPostsM), side);
+          BuildBarrier(from_m, std::min(to_m, line_.length_m() - kPostsM), side);
           break;
         case 2:  // a wood
           PlantTrees(from_m, to_m, side, 3.0);
@@ -133,7 +123,7 @@ class HighwayBuilder {
     for (double along = from_m; along < to_m; along += random_.Uniform(0.4, 1.6) * spacing_m) {
       const double right = 17.5 + 30.0 * random_.Uniform(0.0, 1.0) * random_.Uniform(0.0, 1.0);
       const TreeKind& kind = trees_[static_cast<size_t>(random_.Index(kNumTreeKinds))];
-      PlantTree(kind, Beside(along, side * right), -0.1, builder_);
+      PlantTree(kind, line_.Beside(along, side * right), -0.1, builder_);
     }
   }
 
@@ -144,8 +134,8 @@ class HighwayBuilder {
     }
     for (double along = from_m; along < to_m; along += kPostsM) {
       const int32_t panel = panels[static_cast<size_t>(random_.Index(kNumKinds))];
-      Surface wall = builder_.Wall(Beside(along, side * kBarrierM), Beside(along + kPostsM, side * kBarrierM), 0.0,
-                                   kPanelM, panel);
+      Surface wall = builder_.Wall(line_.Beside(along, side * kBarrierM),
+                                   line_.Beside(along + kPostsM, side * kBarrierM), 0.0, kPanelM, panel);
       wall.two_sided = true;
       builder_.Add(wall);
     }
@@ -155,23 +145,23 @@ class HighwayBuilder {
   void PutSign(double along_m) {
     const double side = random_.Chance(0.6) ? 1.0 : -1.0;
     const double half = random_.Uniform(1.2, 2.4), tall = random_.Uniform(2.0, 3.2);
-    const Eigen::Vector2d middle = Beside(along_m, side * (kHardShoulderM + 1.5 + half));
-    const Eigen::Vector2d right = side * RightOf(AheadAt(along_m));
+    const Eigen::Vector2d middle = line_.Beside(along_m, side * (kHardShoulderM + 1.5 + half));
+    const Eigen::Vector2d right = side * RightOf(line_.AheadAt(along_m));
     const int32_t board = builder_.AddPaint({Material::kSign, random_.Next(), 2.0 * half, tall, 0.02});
     Surface sign = builder_.Wall(middle - half * right, middle + half * right, 2.2, tall, board);
     sign.two_sided = true;
     builder_.Add(sign);
     const int32_t leg = builder_.AddPaint({Material::kBark, random_.Next(), 0.2, 2.2, 0.02});
     for (const double at : {-0.7, 0.7}) {
-      builder_.Add(builder_.Box(middle + at * half * right, AheadAt(along_m), 0.1, 0.1, 0.0, 2.2, leg, leg));
+      builder_.Add(builder_.Box(middle + at * half * right, line_.AheadAt(along_m), 0.1, 0.1, 0.0, 2.2, leg, leg));
     }
   }
 
   void BuildBridge(double along_m) {
     constexpr double kHighM = 5.5, kThickM = 1.3, kHalfWidthM = 5.0, kHalfLengthM = 26.0;
-    if (along_m + kHalfWidthM > length_m()) return;
-    const Eigen::Vector2d middle = posts_[PostAt(along_m)];
-    const Eigen::Vector2d across = RightOf(AheadAt(along_m));
+    if (along_m + kHalfWidthM > line_.length_m()) return;
+    const Eigen::Vector2d middle = line_.At(along_m);
+    const Eigen::Vector2d across = RightOf(line_.AheadAt(along_m));
     const uint32_t seed = random_.Next();
     const auto concrete = [&](double width, double height) {
       return builder_.AddPaint({Material::kCurb, seed, width, height, 0.03});
@@ -194,7 +184,7 @@ class HighwayBuilder {
   uint32_t seed_;
   WorldBuilder builder_;
   Random random_;
-  Polyline posts_;  // of the middle, every meter
+  MeterLine line_;  // the road's middle
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
   double reach_ = 0.0;  // from there to the road's farthest point
   std::array<TreeKind, kNumTreeKinds> trees_{};

@@ -147,8 +147,7 @@ SimulationOptions ParseSimulation(const std::string& text) {
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
                      " is unknown: give sim:street, sim:street-short, sim:traffic, sim:highway, sim:room, sim:country, "
-                     "sim:walk, sim:desk or "
-                     "sim:robot");
+                     "sim:walk, sim:desk or sim:robot");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {

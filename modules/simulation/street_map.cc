@@ -49,6 +49,19 @@ Polyline Shorten(Polyline line, double length_m) {
   return line;
 }
 
+size_t MeterLine::PostAt(double along_m) const {
+  return std::min(static_cast<size_t>(std::max(0.0, along_m)), posts_.size() - 1);
+}
+
+Eigen::Vector2d MeterLine::AheadAt(double along_m) const {
+  const size_t post = PostAt(along_m);
+  return (posts_[std::min(post + 1, posts_.size() - 1)] - posts_[post > 0 ? post - 1 : 0]).normalized();
+}
+
+Eigen::Vector2d MeterLine::Beside(double along_m, double right_m) const {
+  return At(along_m) + right_m * RightOf(AheadAt(along_m));
+}
+
 Eigen::Vector2d OnCircle(size_t quarter, double part) {
   // A rational parametrization of each quarter: no trigonometry.
   const double c = (1.0 - part * part) / (1.0 + part * part);

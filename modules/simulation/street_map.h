@@ -26,6 +26,25 @@ Eigen::Vector2d OnCircle(size_t quarter, double part);
 // The unit vector to the right of direction `d` for someone on the ground (y down: x right when looking along z).
 inline Eigen::Vector2d RightOf(const Eigen::Vector2d& d) { return {d.y(), -d.x()}; }
 
+// Positions along a line, in m from its beginning; to the meter.
+class MeterLine {
+ public:
+  explicit MeterLine(const Polyline& line) : posts_(Resample(line, 1.0)) {}
+
+  const Polyline& posts() const { return posts_; }  // every meter
+  double length_m() const { return static_cast<double>(posts_.size() - 1); }
+  const Eigen::Vector2d& At(double along_m) const { return posts_[PostAt(along_m)]; }
+  // Its direction there, a unit vector.
+  Eigen::Vector2d AheadAt(double along_m) const;
+  // The position at this distance to its right.
+  Eigen::Vector2d Beside(double along_m, double right_m) const;
+
+ private:
+  size_t PostAt(double along_m) const;
+
+  Polyline posts_;
+};
+
 // A position seen from the nearest middle line.
 struct StreetPosition {
   double along_m = 0.0;    // from the beginning of that street
