@@ -15,7 +15,8 @@ const Eigen::Vector2d kAhead(1.0, 0.0);
 
 class DeskBuilder {
  public:
-  DeskBuilder(uint32_t seed, World& world) : builder_(world), random_(HashOf(seed, 73)) {}
+  DeskBuilder(uint32_t seed, double near_m, double half_width_m, World& world)
+      : near_m_(near_m), half_width_m_(half_width_m), builder_(world), random_(HashOf(seed, 73)) {}
 
   void Build() {
     BuildShell();
@@ -31,10 +32,10 @@ class DeskBuilder {
     return builder_.AddPaint({material, random_.Next(), width, height, texel});
   }
 
-  // The room's walls are 2 to 3 m away, but for the one behind the desk.
   void BuildShell() {
-    constexpr double kX = 2.4, kNear = -3.0, kHeight = 2.5;
-    const Eigen::Vector2d a(-kX, kNear), b(-kX, kBackM + 0.02), c(kX, kBackM + 0.02), d(kX, kNear);
+    constexpr double kHeight = 2.5;
+    const double x = half_width_m_;
+    const Eigen::Vector2d a(-x, -near_m_), b(-x, kBackM + 0.02), c(x, kBackM + 0.02), d(x, -near_m_);
     const auto wall = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
       builder_.Add(
           builder_.Wall(from, to, 0.0, kHeight, Paint(Material::kWallpaper, (to - from).norm(), kHeight, 0.005)));
@@ -44,15 +45,15 @@ class DeskBuilder {
     wall(c, d);
     wall(d, a);
     const double depth = b.y() - a.y();
-    builder_.Add({{-kX, 0.0, kNear},
-                  {2.0 * kX, 0.0, 0.0},
+    builder_.Add({{-x, 0.0, -near_m_},
+                  {2.0 * x, 0.0, 0.0},
                   {0.0, 0.0, depth},
-                  Paint(Material::kCarpet, 2.0 * kX, depth, 0.005),
+                  Paint(Material::kCarpet, 2.0 * x, depth, 0.005),
                   0.8F});
-    builder_.Add({{-kX, -kHeight, b.y()},
-                  {2.0 * kX, 0.0, 0.0},
+    builder_.Add({{-x, -kHeight, b.y()},
+                  {2.0 * x, 0.0, 0.0},
                   {0.0, 0.0, -depth},
-                  Paint(Material::kCeiling, 2.0 * kX, depth, 0.02),
+                  Paint(Material::kCeiling, 2.0 * x, depth, 0.02),
                   0.95F});
   }
 
@@ -125,22 +126,25 @@ class DeskBuilder {
                                  Paint(Material::kPoster, 2.0 * half, height)));
     }
     for (const double side : {-1.0, 1.0}) {
-      PutBox({2.2 * side, random_.Uniform(-1.0, -0.2)}, {0.0, 1.0}, {0.6, 0.9, 0.17}, 0.0, Material::kBooks);
-      PutBox({2.15 * side, random_.Uniform(-2.4, -1.9)}, {0.0, 1.0}, {0.3, 0.35, 0.2}, 0.0, Material::kPackage);
+      PutBox({(half_width_m_ - 0.2) * side, random_.Uniform(-1.0, -0.2)}, {0.0, 1.0}, {0.6, 0.9, 0.17}, 0.0,
+             Material::kBooks);
+      PutBox({(half_width_m_ - 0.25) * side, random_.Uniform(-2.4, -1.9)}, {0.0, 1.0}, {0.3, 0.35, 0.2}, 0.0,
+             Material::kPackage);
     }
     PutBox({random_.Uniform(0.35, 0.6), -0.75}, Turned(0.4), {0.22, 0.03, 0.22}, 0.42, Material::kCarpet);
     PutBox({random_.Uniform(-1.3, -1.1), 0.2}, Turned(0.3), {0.2, 0.2, 0.15}, 0.0, Material::kPackage);
   }
 
+  double near_m_, half_width_m_;
   WorldBuilder builder_;
   Random random_;
 };
 
 }  // namespace
 
-World BuildDesk(uint32_t seed) {
+World BuildDesk(uint32_t seed, double near_m, double half_width_m) {
   World world;
-  DeskBuilder(seed, world).Build();
+  DeskBuilder(seed, near_m, half_width_m, world).Build();
   return world;
 }
 

@@ -259,7 +259,7 @@ class StreetBuilder {
 
   // Cars on the other lane, against the drive.
   void SendCars() {
-    Polyline way = Resample(plan_.drive, kCarStepM);
+    Polyline way = Resample(plan_.drive, kMoverStepM);
     std::reverse(way.begin(), way.end());
     Polyline lane;
     for (size_t i = 0; i < way.size(); ++i) {
@@ -268,12 +268,12 @@ class StreetBuilder {
     }
     const double length = LengthOf(lane);
     for (double position = random_.Uniform(40.0, 100.0); position < length; position += random_.Uniform(90.0, 260.0)) {
-      MovingCar car;
+      Mover car;
       car.way = lane;
       const double speed_mps = random_.Uniform(6.0, 11.0);
       car.position_m = [=](double time_s) { return position + speed_mps * time_s; };
       car.body = BuildCar({0.0, 0.0}, {0.0, 1.0}, random_.Next(), builder_);
-      world_.cars.push_back(std::move(car));
+      world_.movers.push_back(std::move(car));
     }
   }
 

@@ -192,6 +192,25 @@ Rigid3 DeskTrajectory::WorldFromCamera(double time_s) const {
   return {(level.rotation * turn).normalized(), position};
 }
 
+OfficeTrajectory::OfficeTrajectory(double duration_s, double speed, uint32_t seed)
+    : duration_s_(duration_s), speed_(speed), seed_(seed) {}
+
+Rigid3 OfficeTrajectory::WorldFromCamera(double time_s) const {
+  const double time = speed_ * time_s;
+  const auto noise = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, 24, axis), hertz * time); };
+  const double shift = static_cast<double>(UnitOf(HashOf(seed_, 25)));
+  const Eigen::Vector3d position(0.35 * Wave(time / 7.0 + shift) + 0.08 * noise(1, 0.5) + 0.003 * noise(2, 5.0),
+                                 -1.45 + 0.2 * Wave(time / 5.3 + shift) + 0.003 * noise(3, 4.0),
+                                 -2.7 + 0.2 * Wave(time / 6.1) + 0.05 * noise(4, 0.6));
+  const Eigen::Vector3d target(0.35 * Wave(time / 8.3 + shift) + 0.1 * noise(5, 0.7), -0.95 + 0.12 * noise(6, 0.6),
+                               0.2);
+  const Rigid3 level = LookAlong(position, target - position);
+  // Tangents of half the angle: no trigonometry.
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(1.0, 0.006 * noise(7, 3.0), 0.006 * noise(8, 3.0), 0.04 * noise(9, 0.7)).normalized();
+  return {(level.rotation * turn).normalized(), position};
+}
+
 HandTrajectory::HandTrajectory(const Eigen::Vector3d& room_m, double duration_s, double speed, uint32_t seed)
     : room_m_(room_m), duration_s_(duration_s), speed_(speed), seed_(seed) {}
 

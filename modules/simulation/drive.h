@@ -104,6 +104,19 @@ class DeskTrajectory : public Trajectory {
   uint32_t seed_;
 };
 
+// A camera in the hand of someone who stands 2.7 m before the desk and films it, at some 0.25 m/s.
+class OfficeTrajectory : public Trajectory {
+ public:
+  OfficeTrajectory(double duration_s, double speed, uint32_t seed);
+  double duration_s() const override { return duration_s_; }
+  Rigid3 WorldFromCamera(double time_s) const override;
+
+ private:
+  double duration_s_;
+  double speed_;
+  uint32_t seed_;
+};
+
 // A camera low on a wheeled robot that goes twice around the table in the middle of a room of this size: along a
 // rectangle, and at its corners it stops and turns where it stands, at every second one by 270 degrees.
 class RobotTrajectory : public Trajectory {

@@ -79,16 +79,16 @@ class TrafficBuilder {
 
  private:
   // Along the lane; it begins kBeyondM before the drive.
-  Polyline Lane(double right_m) const { return Resample(Shift(plan_.middle, right_m), kCarStepM); }
+  Polyline Lane(double right_m) const { return Resample(Shift(plan_.middle, right_m), kMoverStepM); }
 
   void Send(Polyline lane, std::function<double(double)> position_m, bool is_lorry) {
-    MovingCar car;
+    Mover car;
     car.way = std::move(lane);
     car.position_m = std::move(position_m);
     car.body = is_lorry ? BuildLorry(random_.Uniform(9.0, 16.0), random_, builder_)
                         : BuildCar({0.0, 0.0}, {0.0, 1.0}, random_.Next(), builder_);
     car.gap_m = 0.0;
-    world_.cars.push_back(std::move(car));
+    world_.movers.push_back(std::move(car));
   }
 
   // So far ahead of the camera when that has come `at_m` far.

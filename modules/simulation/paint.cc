@@ -76,6 +76,8 @@ Texture Paint(const PaintSpec& spec, const StreetMap* map) {
       return PaintPaper(spec);
     case Material::kPackage:
       return PaintPackage(spec);
+    case Material::kCloth:
+      return PaintCloth(spec);
     case Material::kCeiling:
       return PaintPlain(spec, 205.0, 3.0, 8.0);
   }

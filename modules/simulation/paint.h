@@ -40,6 +40,7 @@ enum class Material {
   kKeys,    // of its keyboard
   kPaper,   // with lines of text and a drawing
   kPackage,
+  kCloth,  // of a shirt, plain or checked, or of trousers
   kCeiling,
 };
 
@@ -84,6 +85,7 @@ Texture PaintScreen(const PaintSpec& spec);
 Texture PaintKeys(const PaintSpec& spec);
 Texture PaintPaper(const PaintSpec& spec);
 Texture PaintPackage(const PaintSpec& spec);
+Texture PaintCloth(const PaintSpec& spec);
 // Of one tone with this grain: bark, curbs, car roofs, carpets, ceilings, hedges.
 Texture PaintPlain(const PaintSpec& spec, double tone, double fine, double coarse);
 

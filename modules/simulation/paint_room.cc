@@ -129,4 +129,24 @@ Texture PaintPackage(const PaintSpec& spec) {
   return MakeTexture(std::move(canvas.image()), {});
 }
 
+// Folds, which bend the checks of every second one; on others a print.
+Texture PaintCloth(const PaintSpec& spec) {
+  Random random(HashOf(spec.seed, 29));
+  const double tone = random.Uniform(40.0, 200.0);
+  const Grain folds{4.0, 26.0};
+  Canvas canvas(spec.width_m, spec.height_m, spec.texel_m, spec.seed, tone, folds);
+  const double w = spec.width_m, h = spec.height_m;
+  if (random.Chance(0.5)) {
+    const double check_m = random.Uniform(0.03, 0.06), stripe_m = random.Uniform(0.25, 0.45) * check_m;
+    const double other = tone > 120.0 ? tone - 70.0 : tone + 70.0;
+    const auto next_m = [&] { return random.Uniform(0.7, 1.4) * check_m; };
+    for (double x = 0.3 * check_m; x < w; x += next_m()) canvas.Fill({x, 0.0, stripe_m, h}, other, folds);
+    for (double y = 0.3 * check_m; y < h; y += next_m()) canvas.Fill({0.0, y, w, stripe_m}, other, folds);
+  } else {
+    canvas.Scribble({0.2 * w, 0.5 * h, 0.6 * w, 0.3 * h}, 0.04, tone > 120.0 ? 30.0 : 220.0);
+  }
+  for (double y = 0.08; y < h; y += random.Uniform(0.07, 0.12)) canvas.Fill({0.5 * w, y, 0.012, 0.012}, 230.0);
+  return MakeTexture(std::move(canvas.image()), {});
+}
+
 }  // namespace tessera

@@ -224,21 +224,21 @@ bool IsInSight(const Surface& surface, const CameraCalibration& camera, double m
   return std::none_of(std::begin(beyond), std::end(beyond), [](int num) { return num == 4; });
 }
 
-// The car's body at this time; nullopt once it has left its way.
-std::optional<std::vector<Surface>> PlaceCar(const MovingCar& car, double time_s) {
-  const double position = car.position_m(time_s) / kCarStepM;
-  if (position < 1.0 || position + 2.0 >= static_cast<double>(car.way.size())) return std::nullopt;
+// Its body at this time; nullopt once it has left its way.
+std::optional<std::vector<Surface>> Place(const Mover& mover, double time_s) {
+  const double position = mover.position_m(time_s) / kMoverStepM;
+  if (position < 1.0 || position + 2.0 >= static_cast<double>(mover.way.size())) return std::nullopt;
   const auto i = static_cast<size_t>(position);
-  const Eigen::Vector2d step = car.way[i + 1] - car.way[i];
-  const Eigen::Vector2d middle = car.way[i] + (position - static_cast<double>(i)) * step;
-  // Between the directions of the segments before and after, so that the car turns smoothly.
-  const Eigen::Vector2d ahead = (car.way[i + 2] - car.way[i - 1]).normalized();
+  const Eigen::Vector2d step = mover.way[i + 1] - mover.way[i];
+  const Eigen::Vector2d middle = mover.way[i] + (position - static_cast<double>(i)) * step;
+  // Between the directions of the segments before and after, so that it turns smoothly.
+  const Eigen::Vector2d ahead = (mover.way[i + 2] - mover.way[i - 1]).normalized();
   const Eigen::Vector2d right = RightOf(ahead);
   const auto turn = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
     const Eigen::Vector2d ground = v.x() * right + v.z() * ahead;
     return {ground.x(), v.y(), ground.y()};
   };
-  std::vector<Surface> body = car.body;
+  std::vector<Surface> body = mover.body;
   for (Surface& surface : body) {
     surface.corner = turn(surface.corner) + Eigen::Vector3d(middle.x(), 0.0, middle.y());
     surface.across = turn(surface.across);
@@ -266,9 +266,9 @@ void Renderer::Collect(const CameraCalibration& camera, const Rigid3& world_from
   };
   for (const Surface& surface : world_->surfaces) add(surface, world_->sight_m);
   for (const Surface& surface : world_->far) add(surface, 1e9);
-  for (const MovingCar& car : world_->cars) {
-    const auto body = PlaceCar(car, time_s);
-    if (!body || (body->front().Center() - eye).norm() < car.gap_m) continue;
+  for (const Mover& mover : world_->movers) {
+    const auto body = Place(mover, time_s);
+    if (!body || (body->front().Center() - eye).norm() < mover.gap_m) continue;
     for (const Surface& surface : *body) add(surface, world_->sight_m);
   }
   std::sort(visible_.begin(), visible_.end(), [](const Visible& a, const Visible& b) {

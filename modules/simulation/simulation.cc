@@ -38,6 +38,7 @@ const CameraModel& ModelOf(Scene scene) {
     case Scene::kWalk:
       return kWalkCamera;
     case Scene::kDesk:
+    case Scene::kOffice:
       return kKinect;
     default:
       return kCarCamera;
@@ -103,6 +104,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
                                                {"depth_delay", &options.depth_delay_ms},
                                                {"stop", &options.stop_m},
                                                {"body", &options.body},
+                                               {"people", &options.people},
                                                {"stamp", &options.stamp}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
@@ -111,7 +113,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
   } else {
     throw InputError("sim: `" + key + "=" + value +
                      "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-                     "depth_delay (ms), stop (m), body, stamp, speed, noise, scale or path");
+                     "depth_delay (ms), stop (m), people, body, stamp, speed, noise, scale or path");
   }
 }
 
@@ -130,6 +132,7 @@ Result<> SimulationOptions::Check() const {
     return Failed("sim: depth_delay must be between -100 and 100 ms");
   }
   if (!(body >= 0.0 && body <= 0.5)) return Failed("sim: body must be between 0 and 0.5 of the image's height");
+  if (!(people >= 0.0 && people <= 8.0)) return Failed("sim: people must be between 0 and 8");
   if (!(stamp == 0.0 || stamp == 1.0)) return Failed("sim: stamp must be 0 or 1");
   if (!(stop_m >= 7.0 && stop_m <= 20.0)) return Failed("sim: stop must be between 7 and 20 m");
   return {};
@@ -142,12 +145,12 @@ SimulationOptions ParseSimulation(const std::string& text) {
                                             {"traffic", Scene::kTraffic}, {"highway", Scene::kHighway},
                                             {"room", Scene::kRoom},       {"country", Scene::kCountry},
                                             {"walk", Scene::kWalk},       {"desk", Scene::kDesk},
-                                            {"robot", Scene::kRobot}};
+                                            {"office", Scene::kOffice},   {"robot", Scene::kRobot}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
                      " is unknown: give sim:street, sim:street-short, sim:traffic, sim:highway, sim:room, sim:country, "
-                     "sim:walk, sim:desk or sim:robot");
+                     "sim:walk, sim:desk, sim:office or sim:robot");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -212,6 +215,11 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
     case Scene::kDesk:
       trajectory_ = std::make_unique<DeskTrajectory>(options.duration_s, options.speed, options.seed);
       world = BuildDesk(options.seed);
+      break;
+    case Scene::kOffice:
+      trajectory_ = std::make_unique<OfficeTrajectory>(options.duration_s, options.speed, options.seed);
+      world = BuildDesk(options.seed, 4.4, 3.2);
+      AddPeople(static_cast<int>(options.people), options.duration_s, options.seed, world);
       break;
     case Scene::kWalk: {
       const StreetPlan plan = PlanStroll(options.seed, options.length_m);
@@ -278,7 +286,7 @@ CameraFrame Simulation::Render(FrameId id) {
     if (options_.depth_delay_ms != 0.0) {
       RenderEye(time + 0.001 * options_.depth_delay_ms, 0.0, rendering_);
     }
-    if (options_.scene == Scene::kDesk) {
+    if (options_.scene == Scene::kDesk || options_.scene == Scene::kOffice) {
       DepthSensor sensor;
       sensor.disparity_noise_px *= options_.noise;
       frame.depth = MeasureDepth(rendering_, camera_, sensor, options_.seed, picture);

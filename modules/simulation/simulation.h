@@ -14,7 +14,7 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kTraffic, kHighway, kRoom, kCountry, kWalk, kDesk, kRobot };
+  enum class Scene { kStreet, kStreetShort, kTraffic, kHighway, kRoom, kCountry, kWalk, kDesk, kOffice, kRobot };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;            // another seed, another town
   double length_m = 0.0;        // of a drive; 0: all of it
@@ -26,6 +26,7 @@ struct SimulationOptions {
   double depth_delay_ms = 0.0;  // RGB-D: depth is taken so much later than the image, as by a Kinect
   double stop_m = 12.0;         // traffic: it stops so far before the middle of a crossing
   double body = 0.0;            // share of the image's height that shows the car or robot itself, at the bottom
+  double people = 3.0;          // office: who walks around
   double stamp = 0.0;           // 1: the time is written into the image, as dashcams do
   std::string path;             // a drive along the poses of a KITTI file instead of through the town
 
@@ -33,7 +34,8 @@ struct SimulationOptions {
   Result<> Check() const;
 };
 
-// Reads the name of a world (street, street-short, traffic, highway, room, country, walk, desk, robot) and options
+// Reads the name of a world (street, street-short, traffic, highway, room, country, walk, desk, office,
+// robot) and options
 // behind it: "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 

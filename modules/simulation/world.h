@@ -38,18 +38,19 @@ struct Surface {
   }
 };
 
-struct MovingCar {
-  Polyline way;                              // every kCarStepM
+// A car, or a part of a person, such as a leg.
+struct Mover {
+  Polyline way;                              // every kMoverStepM
   std::function<double(double)> position_m;  // along the way, at a time (s); there is none before and behind it
   std::vector<Surface> body;                 // around the origin, facing +z
   double gap_m = 4.5;  // to the middle of its right side: nearer it isn't drawn, so that it can't sit on the camera
 };
-inline constexpr double kCarStepM = 0.5;
+inline constexpr double kMoverStepM = 0.5;
 
 struct World {
   std::vector<PaintSpec> paints;
   std::vector<Surface> surfaces;
-  std::vector<MovingCar> cars;
+  std::vector<Mover> movers;
   std::shared_ptr<const StreetMap> streets;  // null: a room
   double sight_m = 260.0;                    // surfaces whose center is farther are not drawn, but `far` ones are
   std::vector<Surface> far;                  // sky and skyline
@@ -114,7 +115,10 @@ void AddTraffic(const StreetPlan& plan, const std::shared_ptr<const CarTrajector
 void AddBody(const CameraCalibration& camera, double share, double reach_m, uint32_t seed, World& world);
 // A furnished room with its middle at the origin; x, height, z.
 World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);
-// A desk at the origin, 0.72 m high, seen from where z is negative; a room around it.
-World BuildDesk(uint32_t seed);
+// A desk at the origin, 0.72 m high, seen from where z is negative; a room around it, up to `near_m` before the desk
+// and twice `half_width_m` wide.
+World BuildDesk(uint32_t seed, double near_m = 3.0, double half_width_m = 2.4);
+// Besides, people who walk around before the desk for `duration_s`, stop and go on, and a chair that one of them moves.
+void AddPeople(int num_people, double duration_s, uint32_t seed, World& world);
 
 }  // namespace tessera

@@ -64,11 +64,11 @@ TEST(HighwayTraffic, LorriesAreFollowedAndPassed) {
   AddHighwayTraffic(plan, drive, 3, world);
   // How far ahead of the camera a vehicle of the same direction is, at each second.
   int num_followed = 0, num_passed = 0;
-  for (const MovingCar& car : world.cars) {
+  for (const Mover& car : world.movers) {
     double at_first = 0.0, at_last = 0.0;
     int num_near = 0;
     for (double time = 0.0; time + 1.0 < drive->duration_s(); time += 1.0) {
-      const double position = car.position_m(time) / kCarStepM;
+      const double position = car.position_m(time) / kMoverStepM;
       if (position < 1.0 || position + 2.0 > static_cast<double>(car.way.size())) continue;
       const auto i = static_cast<size_t>(position);
       const Eigen::Vector2d ahead = drive->DirectionAt(time), along = (car.way[i + 1] - car.way[i]).normalized();

@@ -43,8 +43,9 @@ TEST(Texture, EachLevelHalvesTheOneBeforeAndKeepsItsMean) {
 }
 
 TEST(Paint, IsAFunctionOfItsSpecification) {
-  for (const Material material : {Material::kFacade, Material::kFoliage, Material::kCarSide, Material::kBooks,
-                                  Material::kField, Material::kScreen, Material::kPaper, Material::kPackage}) {
+  for (const Material material :
+       {Material::kFacade, Material::kFoliage, Material::kCarSide, Material::kBooks, Material::kField,
+        Material::kScreen, Material::kPaper, Material::kPackage, Material::kCloth}) {
     const PaintSpec spec{.material = material, .seed = 7, .width_m = 3.0, .height_m = 2.0};
     PaintSpec other = spec;
     other.seed = 8;
