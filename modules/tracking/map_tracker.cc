@@ -84,8 +84,9 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
-  WatchBody(features);
-  const CapturedFrame captured = times_.Captured(own_body_.Without(features), replica_.map().lens());
+  Watch(features);
+  const CapturedFrame captured =
+      times_.Captured(moving_things_.Without(own_body_.Without(features)), replica_.map().lens());
   const Frame& view = captured.view;
   calibration_ = features.calibration;
   const State before = state();
@@ -127,18 +128,32 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   return result;
 }
 
+// For what moves by itself, and what moves with the camera: where something goes by, it isn't the scene that has gone.
 // A pose by points that moved with the camera was wrong, and so is what it said of motion and of what stands still. One
 // that moved steadily was not by them.
-void MapTracker::WatchBody(const FeatureFrame& features) {
-  if (features.frame == body_frame_) return;
-  body_frame_ = features.frame;
+void MapTracker::Watch(const FeatureFrame& features) {
+  if (features.frame == watched_frame_) return;
+  watched_frame_ = features.frame;
+  moving_things_.Add(own_body_.Without(features), ExpectMotion(features.utime_us));
+  if (moving_things_.any_goes()) return;
   const int num_before = own_body_.num_found();
   own_body_.Add(features);
-  if (own_body_.num_found() == num_before) return;
   const std::optional<MotionPrediction> motion = motion_.Predict(kDriftInterval_s);
-  if (motion && motion->is_steady) return;
+  const bool is_steady = motion && motion->is_steady;
+  if (own_body_.num_found() == num_before || is_steady) return;
   scene_ = {};
   ForgetMotion();
+}
+
+// Since the last frame, if that was tracked.
+std::optional<ExpectedMotion> MapTracker::ExpectMotion(int64_t utime_us) const {
+  if (!last_ || last_->frame.view->features().utime_us != previous_utime_us_) return std::nullopt;
+  const double interval_s = SecondsOf(utime_us - previous_utime_us_);
+  const std::optional<MotionPrediction> motion = interval_s > 0.0 ? motion_.Predict(interval_s) : std::nullopt;
+  if (!motion) return std::nullopt;
+  ExpectedMotion expected{motion->last_from_current, std::nullopt};
+  if (motion->is_steady) expected.max_off_m = kMaxSigmas * std::sqrt(motion->covariance.trace());
+  return expected;
 }
 
 MapTracker::State MapTracker::state() const {

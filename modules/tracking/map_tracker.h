@@ -27,6 +27,7 @@
 #include "tracking/lost_way.h"
 #include "tracking/map_replica.h"
 #include "tracking/motion_model.h"
+#include "tracking/moving_things.h"
 #include "tracking/own_body.h"
 #include "tracking/part_start.h"
 #include "tracking/reference_keyframe.h"
@@ -103,7 +104,8 @@ class MapTracker {
     KeyframeId since;     // that the last of them names
   };
 
-  void WatchBody(const FeatureFrame& features);
+  void Watch(const FeatureFrame& features);
+  std::optional<ExpectedMotion> ExpectMotion(int64_t utime_us) const;
   void UpdateLast();
   bool TakeAnswer(const RelocalizationAnswer& answer, const Frame& view);
   bool CanAskFor(const FrameView& view) const;
@@ -151,7 +153,8 @@ class MapTracker {
   MotionModel motion_;                  // in the reference's units
   CaptureTimes times_;
   OwnBody own_body_;
-  FrameId body_frame_;           // the last that it was shown
+  MovingThings moving_things_;
+  FrameId watched_frame_;        // the last that both were shown
   int num_body_told_ = 0;        // OwnBody::num_found() when its landmarks were named
   KeyframeId tells_body_until_;  // keyframes on their way may bring more of them
   KeyframeId next_keyframe_{0};
