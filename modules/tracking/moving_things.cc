@@ -7,6 +7,7 @@
 
 #include "core/quantile.h"
 #include "core/time_units.h"
+#include "features/erase_keypoints.h"
 #include "geometry/absolute_pose.h"
 #include "matching/matching.h"
 #include "measurement/feature_grid.h"
@@ -84,14 +85,7 @@ void MovingThings::Add(const FeatureFrame& features, const std::optional<Expecte
 
 FeatureFrame MovingThings::Without(FeatureFrame features) const {
   if (num_moving_ == 0) return features;
-  size_t num = 0;
-  for (size_t i = 0; i < features.keypoints.size(); ++i) {
-    if (Covers(features, static_cast<int32_t>(i))) continue;
-    features.keypoints[num] = features.keypoints[i];
-    features.descriptors[num++] = features.descriptors[i];
-  }
-  features.keypoints.resize(num);
-  features.descriptors.resize(num);
+  EraseKeypoints(features, [&](size_t i) { return Covers(features, static_cast<int32_t>(i)); });
   return features;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "features/erase_keypoints.h"
 #include "measurement/feature_grid.h"
 #include "measurement/keypoint_measurement.h"
 
@@ -76,14 +77,7 @@ void OwnBody::Add(const FeatureFrame& features) {
 
 FeatureFrame OwnBody::Without(FeatureFrame features) const {
   if (num_body_ == 0) return features;
-  size_t num = 0;
-  for (size_t i = 0; i < features.keypoints.size(); ++i) {
-    if (Covers(features.keypoints[i])) continue;
-    features.keypoints[num] = features.keypoints[i];
-    features.descriptors[num++] = features.descriptors[i];
-  }
-  features.keypoints.resize(num);
-  features.descriptors.resize(num);
+  EraseKeypoints(features, [&](size_t i) { return Covers(features.keypoints[i]); });
   return features;
 }
 
