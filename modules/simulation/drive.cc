@@ -171,13 +171,10 @@ Rigid3 WalkTrajectory::WorldFromCamera(double time_s) const {
   return {(level.rotation * turn).normalized(), level.translation};
 }
 
-DeskTrajectory::DeskTrajectory(double duration_s, double speed, uint32_t seed)
-    : duration_s_(duration_s), speed_(speed), seed_(seed) {}
-
 Rigid3 DeskTrajectory::WorldFromCamera(double time_s) const {
-  const double time = speed_ * time_s;
-  const auto noise = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, 21, axis), hertz * time); };
-  const double shift = static_cast<double>(UnitOf(HashOf(seed_, 22)));
+  const double time = speed() * time_s;
+  const auto noise = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed(), 21, axis), hertz * time); };
+  const double shift = static_cast<double>(UnitOf(HashOf(seed(), 22)));
   const Eigen::Vector3d position(0.6 * Wave(time / 9.0 + shift) + 0.15 * noise(1, 0.5) + 0.003 * noise(2, 5.0),
                                  -1.3 + 0.18 * Wave(time / 6.3 + shift) + 0.05 * noise(3, 0.8) + 0.003 * noise(4, 4.0),
                                  -0.75 + 0.25 * Wave(time / 7.7) + 0.1 * noise(5, 0.6));
@@ -185,20 +182,17 @@ Rigid3 DeskTrajectory::WorldFromCamera(double time_s) const {
                                0.1 + 0.2 * noise(8, 0.5));
   const Rigid3 level = LookAlong(position, target - position);
   // Tangents of half the angle: no trigonometry.
-  const double aside = AsideAt(time, seed_);
+  const double aside = AsideAt(time, seed());
   const double pitch = 0.01 * noise(9, 3.0) + 0.12 * aside;
   const double roll = 0.05 * noise(10, 0.7) + 0.006 * noise(11, 4.0);
   const Eigen::Quaterniond turn = Eigen::Quaterniond(1.0, pitch, aside + 0.006 * noise(12, 4.5), roll).normalized();
   return {(level.rotation * turn).normalized(), position};
 }
 
-OfficeTrajectory::OfficeTrajectory(double duration_s, double speed, uint32_t seed)
-    : duration_s_(duration_s), speed_(speed), seed_(seed) {}
-
 Rigid3 OfficeTrajectory::WorldFromCamera(double time_s) const {
-  const double time = speed_ * time_s;
-  const auto noise = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed_, 24, axis), hertz * time); };
-  const double shift = static_cast<double>(UnitOf(HashOf(seed_, 25)));
+  const double time = speed() * time_s;
+  const auto noise = [&](uint32_t axis, double hertz) { return SmoothNoise(HashOf(seed(), 24, axis), hertz * time); };
+  const double shift = static_cast<double>(UnitOf(HashOf(seed(), 25)));
   const Eigen::Vector3d position(0.35 * Wave(time / 7.0 + shift) + 0.08 * noise(1, 0.5) + 0.003 * noise(2, 5.0),
                                  -1.45 + 0.2 * Wave(time / 5.3 + shift) + 0.003 * noise(3, 4.0),
                                  -2.7 + 0.2 * Wave(time / 6.1) + 0.05 * noise(4, 0.6));
@@ -211,15 +205,12 @@ Rigid3 OfficeTrajectory::WorldFromCamera(double time_s) const {
   return {(level.rotation * turn).normalized(), position};
 }
 
-HandTrajectory::HandTrajectory(const Eigen::Vector3d& room_m, double duration_s, double speed, uint32_t seed)
-    : room_m_(room_m), duration_s_(duration_s), speed_(speed), seed_(seed) {}
-
 Rigid3 HandTrajectory::WorldFromCamera(double time_s) const {
-  const double round = speed_ * time_s / 20.0;  // one round takes 20 s
-  const double shift = static_cast<double>(UnitOf(HashOf(seed_, 1)));
+  const double round = speed() * time_s / 20.0;  // one round takes 20 s
+  const double shift = static_cast<double>(UnitOf(HashOf(seed(), 1)));
   const auto tremor = [&](uint32_t axis) {
-    return 0.012 * SmoothNoise(HashOf(seed_, axis), 1.3 * time_s) +
-           0.003 * SmoothNoise(HashOf(seed_, axis, 1), 5.0 * time_s);
+    return 0.012 * SmoothNoise(HashOf(seed(), axis), 1.3 * time_s) +
+           0.003 * SmoothNoise(HashOf(seed(), axis, 1), 5.0 * time_s);
   };
   const Eigen::Vector3d position(0.2 * room_m_.x() * Wave(round + shift) + tremor(2),
                                  -1.45 + 0.15 * Wave(2.0 * round) + tremor(3),

@@ -76,45 +76,47 @@ class WalkTrajectory : public Trajectory {
   uint32_t seed_;
 };
 
-// A camera in someone's hand who walks around in a room of this size and looks about. Comes back to its start.
-class HandTrajectory : public Trajectory {
+// A camera in someone's hand.
+class HeldTrajectory : public Trajectory {
  public:
-  HandTrajectory(const Eigen::Vector3d& room_m, double duration_s, double speed, uint32_t seed);
+  HeldTrajectory(double duration_s, double speed, uint32_t seed)
+      : duration_s_(duration_s), speed_(speed), seed_(seed) {}
   double duration_s() const override { return duration_s_; }
+
+ protected:
+  double speed() const { return speed_; }  // times the usual
+  uint32_t seed() const { return seed_; }
+
+ private:
+  double duration_s_;
+  double speed_;
+  uint32_t seed_;
+};
+
+// Of someone who walks around in a room of this size and looks about. Comes back to its start.
+class HandTrajectory : public HeldTrajectory {
+ public:
+  HandTrajectory(const Eigen::Vector3d& room_m, double duration_s, double speed, uint32_t seed)
+      : HeldTrajectory(duration_s, speed, seed), room_m_(room_m) {}
   Rigid3 WorldFromCamera(double time_s) const override;
 
  private:
   Eigen::Vector3d room_m_;
-  double duration_s_;
-  double speed_;
-  uint32_t seed_;
 };
 
-// A camera in someone's hand who looks at a desk (see BuildDesk) from all around it, and every few seconds quickly
-// aside and back, at up to some 3 rad/s.
-class DeskTrajectory : public Trajectory {
+// Of someone who looks at a desk (see BuildDesk) from all around it, and every few seconds quickly aside and back, at
+// up to some 3 rad/s.
+class DeskTrajectory : public HeldTrajectory {
  public:
-  DeskTrajectory(double duration_s, double speed, uint32_t seed);
-  double duration_s() const override { return duration_s_; }
+  using HeldTrajectory::HeldTrajectory;
   Rigid3 WorldFromCamera(double time_s) const override;
-
- private:
-  double duration_s_;
-  double speed_;
-  uint32_t seed_;
 };
 
-// A camera in the hand of someone who stands 2.7 m before the desk and films it, at some 0.25 m/s.
-class OfficeTrajectory : public Trajectory {
+// Of someone who stands 2.7 m before the desk and films it, at some 0.25 m/s.
+class OfficeTrajectory : public HeldTrajectory {
  public:
-  OfficeTrajectory(double duration_s, double speed, uint32_t seed);
-  double duration_s() const override { return duration_s_; }
+  using HeldTrajectory::HeldTrajectory;
   Rigid3 WorldFromCamera(double time_s) const override;
-
- private:
-  double duration_s_;
-  double speed_;
-  uint32_t seed_;
 };
 
 // A camera low on a wheeled robot that goes twice around the table in the middle of a room of this size: along a
