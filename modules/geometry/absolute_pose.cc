@@ -94,23 +94,67 @@ std::array<double, 5> GrunertQuartic(double a2, double b2, double c2, double cos
           (p - 1.0) * (p - 1.0) - 4.0 * c * cos_a * cos_a};
 }
 
-int CountInliers(const CameraCalibration& calibration, std::span<const PointPixel> points, const Rigid3& pose,
-                 std::vector<char>& is_inlier) {
-  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
-  int num_inliers = 0;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d in_camera = rotation * points[i].point_in_world + pose.translation;
-    const bool fits = in_camera.z() > 0.0 && (calibration.Project(in_camera) - points[i].pixel_px).squaredNorm() <=
-                                                 Chi2Limit(false) * points[i].sigma_px * points[i].sigma_px;
-    is_inlier[i] = fits ? 1 : 0;
-    num_inliers += fits ? 1 : 0;
+// Points and their pixels by column, which compilers test four at a time. A point agrees with a pose that puts it to
+// (x, y, z), z > 0, if that is within the chi-square limit c (in sigma) of its ray (a, b, 1):
+//
+//   (f_x (x - a z) / (c sigma))^2 + (f_y (y - b z) / (c sigma))^2 <= z^2
+class PointColumns {
+ public:
+  PointColumns(const CameraCalibration& calibration, std::span<const PointPixel> points) {
+    const double limit = std::sqrt(Chi2Limit(false));
+    for (const PointPixel& point : points) {
+      const Eigen::Vector3d ray = calibration.Ray(point.pixel_px);
+      x_.push_back(point.point_in_world.x());
+      y_.push_back(point.point_in_world.y());
+      z_.push_back(point.point_in_world.z());
+      a_.push_back(ray.x());
+      b_.push_back(ray.y());
+      x_weight_.push_back(calibration.fx_px / (limit * point.sigma_px));
+      y_weight_.push_back(calibration.fy_px / (limit * point.sigma_px));
+    }
   }
-  return num_inliers;
-}
+
+  // Stops, with fewer, where `more_than` can't be reached any more.
+  int CountInliers(const Rigid3& camera_from_world, int more_than) const {
+    constexpr size_t kBlock = 32;
+    const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
+    int num_inliers = 0;
+    for (size_t begin = 0; begin < x_.size(); begin += kBlock) {
+      if (num_inliers + static_cast<int>(x_.size() - begin) <= more_than) break;
+      int64_t num_of_block = 0;
+      for (size_t i = begin; i < std::min(begin + kBlock, x_.size()); ++i) {
+        num_of_block += Fits(i, rotation, camera_from_world.translation);
+      }
+      num_inliers += static_cast<int>(num_of_block);
+    }
+    return num_inliers;
+  }
+
+  std::vector<char> FindInliers(const Rigid3& camera_from_world) const {
+    const Eigen::Matrix3d rotation = camera_from_world.rotation.toRotationMatrix();
+    std::vector<char> is_inlier(x_.size());
+    for (size_t i = 0; i < x_.size(); ++i) {
+      is_inlier[i] = static_cast<char>(Fits(i, rotation, camera_from_world.translation));
+    }
+    return is_inlier;
+  }
+
+ private:
+  // 1 or 0, as wide as a double.
+  int64_t Fits(size_t i, const Eigen::Matrix3d& r, const Eigen::Vector3d& t) const {
+    const double x = r(0, 0) * x_[i] + r(0, 1) * y_[i] + r(0, 2) * z_[i] + t.x();
+    const double y = r(1, 0) * x_[i] + r(1, 1) * y_[i] + r(1, 2) * z_[i] + t.y();
+    const double z = r(2, 0) * x_[i] + r(2, 1) * y_[i] + r(2, 2) * z_[i] + t.z();
+    const double x_off = x_weight_[i] * (x - a_[i] * z), y_off = y_weight_[i] * (y - b_[i] * z);
+    return static_cast<int64_t>(z > 0.0) & static_cast<int64_t>(x_off * x_off + y_off * y_off <= z * z);
+  }
+
+  std::vector<double> x_, y_, z_, a_, b_, x_weight_, y_weight_;
+};
 
 // The best pose by the points that agree with `pose`.
 AbsolutePose Refined(const CameraCalibration& calibration, std::span<const PointPixel> points,
-                     const AbsolutePose& pose) {
+                     const PointColumns& columns, const AbsolutePose& pose) {
   std::vector<PoseObservation> observations;
   for (size_t i = 0; i < points.size(); ++i) {
     if (!pose.is_inlier[i]) continue;
@@ -119,10 +163,8 @@ AbsolutePose Refined(const CameraCalibration& calibration, std::span<const Point
     seen.sigma_px = points[i].sigma_px;
     observations.push_back({.point_in_world = points[i].point_in_world, .seen = seen});
   }
-  AbsolutePose refined{OptimizePose(calibration, 0.0, observations, pose.camera_from_world, {}).camera_from_world,
-                       std::vector<char>(points.size()), 0};
-  refined.num_inliers = CountInliers(calibration, points, refined.camera_from_world, refined.is_inlier);
-  return refined;
+  const Rigid3 refined = OptimizePose(calibration, 0.0, observations, pose.camera_from_world, {}).camera_from_world;
+  return {refined, columns.FindInliers(refined), columns.CountInliers(refined, -1)};
 }
 
 }  // namespace
@@ -165,8 +207,8 @@ std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibr
   if (points.size() < static_cast<size_t>(std::max(3, options.min_inliers))) {
     return std::nullopt;
   }
+  const PointColumns columns(calibration, points);
   AbsolutePose best;
-  std::vector<char> is_inlier(points.size());
   ForEachSample<3>(seed, points.size(), options.ransac_iterations, [&](const std::array<size_t, 3>& sample) {
     std::array<Eigen::Vector3d, 3> in_world, rays;
     for (size_t k = 0; k < 3; ++k) {
@@ -174,14 +216,13 @@ std::optional<AbsolutePose> EstimateAbsolutePose(const CameraCalibration& calibr
       rays[k] = calibration.Ray(points[sample[k]].pixel_px);
     }
     for (const Rigid3& pose : PosesFromThreePoints(in_world, rays)) {
-      const int num_inliers = CountInliers(calibration, points, pose, is_inlier);
-      if (num_inliers > best.num_inliers) {
-        best = {pose, is_inlier, num_inliers};
-      }
+      const int num_inliers = columns.CountInliers(pose, best.num_inliers);
+      if (num_inliers > best.num_inliers) best = {.camera_from_world = pose, .num_inliers = num_inliers};
     }
   });
+  best.is_inlier = columns.FindInliers(best.camera_from_world);
   for (int i = 0; i < options.max_refinements && best.num_inliers >= kMinToRefine; ++i) {
-    AbsolutePose refined = Refined(calibration, points, best);
+    AbsolutePose refined = Refined(calibration, points, columns, best);
     if (refined.num_inliers <= best.num_inliers) break;
     best = std::move(refined);
   }
