@@ -36,12 +36,24 @@ EffectsPipeline::EffectsPipeline(const CameraCalibration& camera, const CameraEf
   }
 }
 
+// So that the mean of the image is a middle gray.
+EffectsPipeline::Exposure EffectsPipeline::Expose(const Rendering& rendering) const {
+  constexpr double kMiddleGray = 95.0;
+  if (effects_.max_exposure == 1.0) return {};
+  int64_t sum = 0;
+  for (const uint16_t light : rendering.radiance.pixels) sum += light;
+  const double mean = static_cast<double>(sum) / (256.0 * static_cast<double>(rendering.radiance.pixels.size()));
+  const double needed = kMiddleGray / std::max(1.0, mean);
+  const double time = std::clamp(needed, 1.0 / effects_.max_exposure, effects_.max_exposure);
+  return {time, std::clamp(needed / time, 1.0, effects_.max_exposure)};
+}
+
 // A point at (x, y) = ((u - cx) / fx, (v - cy) / fy) with inverse depth w moves, seen from a camera of velocity (t, o),
 //   x' = (-t_x + x t_z) w + x y o_x - (1 + x^2) o_y + y o_z
 //   y' = (-t_y + y t_z) w + (1 + y^2) o_x - x y o_y - x o_z      (Longuet-Higgins and Prazdny 1980)
-void EffectsPipeline::BlurMotion(const Rendering& rendering, const CameraVelocity& velocity) {
+void EffectsPipeline::BlurMotion(const Rendering& rendering, const CameraVelocity& velocity, double exposure_s) {
   blurred_ = rendering.radiance;
-  const auto time = static_cast<float>(effects_.exposure_s);
+  const auto time = static_cast<float>(exposure_s);
   const Eigen::Vector3f t = velocity.linear_mps.cast<float>() * time;
   const Eigen::Vector3f o = velocity.angular_radps.cast<float>() * time;
   const auto fx = static_cast<float>(camera_.fx_px), fy = static_cast<float>(camera_.fy_px);
@@ -97,15 +109,17 @@ void EffectsPipeline::Spread() {
 
 GrayImage EffectsPipeline::Apply(const Rendering& rendering, const CameraVelocity& velocity, double time_s,
                                  uint32_t picture) {
-  BlurMotion(rendering, velocity);
+  const Exposure exposure = Expose(rendering);
+  BlurMotion(rendering, velocity, exposure.time * effects_.exposure_s);
   Spread();
   const double drift =
       0.7 * SmoothNoise(HashOf(seed_, 31), 0.15 * time_s) + 0.3 * SmoothNoise(HashOf(seed_, 32), 0.8 * time_s);
-  const auto gain = static_cast<float>((1.0 + effects_.exposure_drift * drift) / 256.0);
+  const auto gain = static_cast<float>(exposure.time * exposure.gain * (1.0 + effects_.exposure_drift * drift) / 256.0);
   std::array<float, 256> sigma{};
   for (size_t gray = 0; gray < sigma.size(); ++gray) {
-    sigma[gray] = static_cast<float>(
-        std::sqrt(effects_.read_noise * effects_.read_noise + effects_.shot_noise * static_cast<double>(gray)));
+    sigma[gray] =
+        static_cast<float>(std::sqrt(exposure.gain * exposure.gain * effects_.read_noise * effects_.read_noise +
+                                     exposure.gain * effects_.shot_noise * static_cast<double>(gray)));
   }
   GrayImage image(camera_.width_px, camera_.height_px);
   for (int y = 0; y < image.height; ++y) {

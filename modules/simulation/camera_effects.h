@@ -14,10 +14,13 @@ struct CameraEffects {
   double exposure_s = 0.006;     // motion blur: the shutter is open for so long
   int max_blur_taps = 9;         // samples along the motion of one pixel
   double exposure_drift = 0.12;  // the gain wanders within 1 +- this, over some seconds
-  double vignetting = 0.2;       // light lost in the corners
-  double read_noise = 1.3;       // standard deviation in the dark, gray values
-  double shot_noise = 0.012;     // variance per gray value of light
-  double depth_noise = 0.0015;   // RGB-D: standard deviation of depth per squared meter, 1/m
+  // Each eye exposes for longer where it is dark, up to so many times as long, and amplifies what is missing by up to
+  // as much again, noise included. 1: it does not.
+  double max_exposure = 1.0;
+  double vignetting = 0.2;      // light lost in the corners
+  double read_noise = 1.3;      // standard deviation in the dark, gray values
+  double shot_noise = 0.012;    // variance per gray value of light
+  double depth_noise = 0.0015;  // RGB-D: standard deviation of depth per squared meter, 1/m
 };
 
 // The camera's velocity in its own frame, per second.
@@ -37,7 +40,12 @@ class EffectsPipeline {
   DepthImage Depth(const Rendering& rendering, uint32_t picture) const;
 
  private:
-  void BlurMotion(const Rendering& rendering, const CameraVelocity& velocity);
+  // Of exposure_s, and of what is then missing.
+  struct Exposure {
+    double time = 1.0, gain = 1.0;
+  };
+  Exposure Expose(const Rendering& rendering) const;
+  void BlurMotion(const Rendering& rendering, const CameraVelocity& velocity, double exposure_s);
   void Spread();
 
   CameraCalibration camera_;

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kStepM = 0.25;
 constexpr double kCameraHeightM = 1.65;
+constexpr double kFlightStandsS = 2.0;  // before it takes off
 
 // The distance along a line, reached at this time; `times_s` of its points, which are kStepM apart.
 double DistanceOn(const std::vector<double>& times_s, double time_s) {
@@ -223,6 +224,70 @@ Rigid3 HandTrajectory::WorldFromCamera(double time_s) const {
   const Eigen::Quaterniond shake =
       Eigen::Quaterniond(1.0, tremor(5), tremor(6), 0.05 * Wave(1.5 * round) + tremor(7)).normalized();
   return {(level.rotation * shake).normalized(), position};
+}
+
+// The way along the round is slow at both ends of the flight.
+double FlightTrajectory::FlownAt(double time_s) const {
+  constexpr double kRampS = 5.0;
+  // The integral of Ease().
+  const auto begun = [](double t_s) {
+    const double t = std::clamp(t_s / kRampS, 0.0, 1.0);
+    return kRampS * t * t * t * (1.0 - 0.5 * t) + std::max(0.0, t_s - kRampS);
+  };
+  const double all_s = duration_s() - kFlightStandsS, t_s = time_s - kFlightStandsS;
+  return t_s < 0.5 * all_s ? begun(t_s) : 2.0 * begun(0.5 * all_s) - begun(all_s - t_s);
+}
+
+Eigen::Vector3d FlightTrajectory::PositionAt(double time_s) const {
+  constexpr double kRiseS = 2.5, kGroundM = 0.15;
+  const double up = Ease((time_s - kFlightStandsS) / kRiseS) * Ease((duration_s() - time_s) / kRiseS);
+  const double flown_s = speed() * FlownAt(time_s);
+  const auto noise = [&](uint32_t axis, double hertz) {
+    return SmoothNoise(HashOf(seed(), 26, axis), hertz * flown_s);
+  };
+  const double direction = seed() % 2 == 0 ? 1.0 : -1.0;
+  const double round =
+      static_cast<double>(UnitOf(HashOf(seed(), 27))) + direction * (flown_s / 13.0 + 0.05 * noise(1, 0.2));
+  const double wide = 1.0 + 0.12 * noise(2, 0.25);
+  return {3.8 * wide * Wave(round), -kGroundM - up * (1.5 + 0.5 * noise(3, 0.3) + 0.08 * noise(4, 1.1)),
+          2.7 * wide * Wave(round + 0.25)};
+}
+
+Rigid3 FlightTrajectory::WorldFromCamera(double time_s) const {
+  constexpr double kStepS = 0.2, kGravity_mps2 = 9.8;
+  const double flown_s = speed() * FlownAt(time_s);
+  const auto noise = [&](uint32_t axis, double hertz) {
+    return SmoothNoise(HashOf(seed(), 28, axis), hertz * flown_s);
+  };
+  const auto shake = [&](uint32_t axis) { return 0.0006 * SmoothNoise(HashOf(seed(), 29, axis), 23.0 * time_s); };
+  const Eigen::Vector3d before = PositionAt(time_s - kStepS), position = PositionAt(time_s),
+                        after = PositionAt(time_s + kStepS);
+  const double stands_s = std::min(time_s - kFlightStandsS, duration_s() - time_s);
+  const double aloft = Ease(stands_s / 3.0);
+  // Looks outwards and ahead, and about.
+  const Eigen::Vector3d out = Eigen::Vector3d(position.x(), 0.0, position.z()).normalized();
+  const Eigen::Vector3d way((after - before).x(), 0.0, (after - before).z());
+  const Rigid3 level = LookAlong(position, out + 0.9 / (2.0 * kStepS * 1.5) * way);
+  // Thrust is along the body's axis, which leans by the acceleration over gravity. Tangents of half the angles.
+  const Eigen::Vector3d acceleration = (after - 2.0 * position + before) / (kStepS * kStepS);
+  const Eigen::Vector3d lean = aloft / kGravity_mps2 * (level.rotation.conjugate() * acceleration);
+  const double yaw = aloft * (0.22 * noise(1, 0.35) + 0.05 * noise(2, 1.2));
+  const double pitch = aloft * 0.03 * noise(3, 1.5) - 0.5 * lean.z() + shake(1) - 0.05;
+  const double roll = aloft * 0.03 * noise(4, 1.5) + 0.5 * lean.x() + shake(2);
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(1.0, 0.0, yaw, 0.0).normalized();
+  const Eigen::Quaterniond tilt = Eigen::Quaterniond(1.0, pitch, 0.0, roll).normalized();
+  const Eigen::Quaterniond bump = Eigen::Quaterniond(1.0, BumpAt(time_s), 0.0, -BumpAt(time_s)).normalized();
+  return {(level.rotation * turn * tilt * bump).normalized(), position};
+}
+
+// It hits something at a third and at two thirds of its way, and while it stands: within 0.1 s it tips over, and back.
+double FlightTrajectory::BumpAt(double time_s) const {
+  constexpr double kBumpS = 0.1;
+  double bump = 0.0;
+  for (const double at_s : {1.0, duration_s() / 3.0, duration_s() / 1.5}) {
+    bump += Ease((time_s - at_s) / kBumpS) * Ease((at_s + 2.0 * kBumpS - time_s) / kBumpS);
+  }
+  return bumps_ * bump;
 }
 
 RobotTrajectory::RobotTrajectory(const Eigen::Vector3d& room_m, double speed, uint32_t seed) : seed_(seed) {

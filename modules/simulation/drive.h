@@ -76,10 +76,10 @@ class WalkTrajectory : public Trajectory {
   uint32_t seed_;
 };
 
-// A camera in someone's hand.
-class HeldTrajectory : public Trajectory {
+// A camera that goes about freely for so long.
+class FreeTrajectory : public Trajectory {
  public:
-  HeldTrajectory(double duration_s, double speed, uint32_t seed)
+  FreeTrajectory(double duration_s, double speed, uint32_t seed)
       : duration_s_(duration_s), speed_(speed), seed_(seed) {}
   double duration_s() const override { return duration_s_; }
 
@@ -93,30 +93,47 @@ class HeldTrajectory : public Trajectory {
   uint32_t seed_;
 };
 
-// Of someone who walks around in a room of this size and looks about. Comes back to its start.
-class HandTrajectory : public HeldTrajectory {
+// In the hand of someone who walks around in a room of this size and looks about. Comes back to its start.
+class HandTrajectory : public FreeTrajectory {
  public:
   HandTrajectory(const Eigen::Vector3d& room_m, double duration_s, double speed, uint32_t seed)
-      : HeldTrajectory(duration_s, speed, seed), room_m_(room_m) {}
+      : FreeTrajectory(duration_s, speed, seed), room_m_(room_m) {}
   Rigid3 WorldFromCamera(double time_s) const override;
 
  private:
   Eigen::Vector3d room_m_;
 };
 
-// Of someone who looks at a desk (see BuildDesk) from all around it, and every few seconds quickly aside and back, at
-// up to some 3 rad/s.
-class DeskTrajectory : public HeldTrajectory {
+// In the hand of someone who looks at a desk (see BuildDesk) from all around it, and every few seconds quickly aside
+// and back, at up to some 3 rad/s.
+class DeskTrajectory : public FreeTrajectory {
  public:
-  using HeldTrajectory::HeldTrajectory;
+  using FreeTrajectory::FreeTrajectory;
   Rigid3 WorldFromCamera(double time_s) const override;
 };
 
-// Of someone who stands 2.7 m before the desk and films it, at some 0.25 m/s.
-class OfficeTrajectory : public HeldTrajectory {
+// In the hand of someone who stands 2.7 m before the desk and films it, at some 0.25 m/s.
+class OfficeTrajectory : public FreeTrajectory {
  public:
-  using HeldTrajectory::HeldTrajectory;
+  using FreeTrajectory::FreeTrajectory;
   Rigid3 WorldFromCamera(double time_s) const override;
+};
+
+// On a quadrotor in a hall (see BuildHall): it stands for 2 s with its rotors running, takes off, flies rounds at some
+// 1.5 m/s, leans into what it accelerates to, looks about, and lands.
+class FlightTrajectory : public FreeTrajectory {
+ public:
+  // `bumps`: the tangent of half the angle by which it is knocked over, on its ground and twice on its way.
+  FlightTrajectory(double duration_s, double speed, uint32_t seed, double bumps)
+      : FreeTrajectory(duration_s, speed, seed), bumps_(bumps) {}
+  Rigid3 WorldFromCamera(double time_s) const override;
+
+ private:
+  double FlownAt(double time_s) const;
+  Eigen::Vector3d PositionAt(double time_s) const;
+  double BumpAt(double time_s) const;
+
+  double bumps_;
 };
 
 // A camera low on a wheeled robot that goes twice around the table in the middle of a room of this size: along a

@@ -23,11 +23,12 @@ constexpr CarMotion kHighwayDrive{.cruise_mps = 28.0, .side_acceleration_mps2 = 
 struct CameraModel {
   double width_px, height_px, focal_px, baseline_m, exposure_s, frames_per_s, readout_s;
   int max_blur_taps = 9;
+  double max_exposure = 1.0;
 };
 constexpr CameraModel kCarCamera{1241.0, 376.0, 718.0, 0.54, 0.004, 10.0, 0.0};
 constexpr CameraModel kHandCamera{640.0, 480.0, 525.0, 0.12, 0.008, 30.0, 0.0};
 constexpr CameraModel kKinect{640.0, 480.0, 525.0, 0.12, 0.016, 30.0, 0.025, 25};
-
+constexpr CameraModel kDroneCamera{752.0, 480.0, 458.0, 0.11, 0.003, 20.0, 0.0, 25, 4.0};
 constexpr CameraModel kWalkCamera{640.0, 480.0, 525.0, 0.12, 0.008, 2.0, 0.0};
 
 const CameraModel& ModelOf(Scene scene) {
@@ -40,6 +41,8 @@ const CameraModel& ModelOf(Scene scene) {
     case Scene::kDesk:
     case Scene::kOffice:
       return kKinect;
+    case Scene::kFlight:
+      return kDroneCamera;
     default:
       return kCarCamera;
   }
@@ -68,6 +71,7 @@ CameraEffects MakeEffects(const SimulationOptions& options) {
   CameraEffects effects;
   effects.exposure_s = ModelOf(options.scene).exposure_s;
   effects.max_blur_taps = ModelOf(options.scene).max_blur_taps;
+  effects.max_exposure = ModelOf(options.scene).max_exposure;
   effects.read_noise *= options.noise;
   effects.shot_noise *= options.noise * options.noise;
   effects.depth_noise *= options.noise;
@@ -105,15 +109,19 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
                                                {"stop", &options.stop_m},
                                                {"body", &options.body},
                                                {"people", &options.people},
+                                               {"bumps", &options.bumps},
+                                               {"squint", &options.squint},
+                                               {"twist", &options.twist},
                                                {"stamp", &options.stamp}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
     options.seed = static_cast<uint32_t>(number);
   } else {
-    throw InputError("sim: `" + key + "=" + value +
-                     "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-                     "depth_delay (ms), stop (m), people, body, stamp, speed, noise, scale or path");
+    throw InputError(
+        "sim: `" + key + "=" + value +
+        "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
+        "depth_delay (ms), stop (m), people, bumps, squint, twist, body, stamp, speed, noise, scale or path");
   }
 }
 
@@ -121,7 +129,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
 
 Result<> SimulationOptions::Check() const {
   if (!(length_m >= 0.0 && length_m < 1e5)) return Failed("sim: length must be between 0 and 100000 m");
-  if (!(duration_s > 0.0 && duration_s < 1e5)) return Failed("sim: duration must be between 0 and 100000 s");
+  if (!(duration_s >= 0.0 && duration_s < 1e5)) return Failed("sim: duration must be between 0 and 100000 s");
   if (!(speed >= 0.05 && speed <= 10.0)) return Failed("sim: speed must be between 0.05 and 10 times the usual");
   if (!(noise >= 0.0 && noise <= 20.0)) return Failed("sim: noise must be between 0 and 20 times the usual");
   if (!(scale >= 0.1 && scale <= 4.0)) return Failed("sim: scale must be between 0.1 and 4 times the usual");
@@ -133,6 +141,10 @@ Result<> SimulationOptions::Check() const {
   }
   if (!(body >= 0.0 && body <= 0.5)) return Failed("sim: body must be between 0 and 0.5 of the image's height");
   if (!(people >= 0.0 && people <= 8.0)) return Failed("sim: people must be between 0 and 8");
+  if (!(std::abs(squint) <= 2.0 && std::abs(twist) <= 2.0)) {
+    return Failed("sim: squint and twist must be between -2 and 2 degrees");
+  }
+  if (!(bumps >= 0.0 && bumps <= 1.0)) return Failed("sim: bumps must be between 0 and 1");
   if (!(stamp == 0.0 || stamp == 1.0)) return Failed("sim: stamp must be 0 or 1");
   if (!(stop_m >= 7.0 && stop_m <= 20.0)) return Failed("sim: stop must be between 7 and 20 m");
   return {};
@@ -145,12 +157,13 @@ SimulationOptions ParseSimulation(const std::string& text) {
                                             {"traffic", Scene::kTraffic}, {"highway", Scene::kHighway},
                                             {"room", Scene::kRoom},       {"country", Scene::kCountry},
                                             {"walk", Scene::kWalk},       {"desk", Scene::kDesk},
-                                            {"office", Scene::kOffice},   {"robot", Scene::kRobot}};
+                                            {"office", Scene::kOffice},   {"robot", Scene::kRobot},
+                                            {"flight", Scene::kFlight}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
                      " is unknown: give sim:street, sim:street-short, sim:traffic, sim:highway, sim:room, sim:country, "
-                     "sim:walk, sim:desk, sim:office or sim:robot");
+                     "sim:walk, sim:desk, sim:office, sim:robot or sim:flight");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -170,6 +183,8 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
   ThrowIfFailed<InputError>(options.Check());
   frames_per_s_ = ModelOf(options.scene).frames_per_s;
   readout_s_ = options.readout_ms < 0.0 ? ModelOf(options.scene).readout_s : 0.001 * options.readout_ms;
+  const double free_s = options.scene == Scene::kFlight ? 60.0 : 20.0;
+  const double duration_s = options.duration_s > 0.0 ? options.duration_s : free_s;
   World world;
   switch (options.scene) {
     case Scene::kStreet:
@@ -190,7 +205,7 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       break;
     }
     case Scene::kRoom:
-      trajectory_ = std::make_unique<HandTrajectory>(kRoomM, options.duration_s, options.speed, options.seed);
+      trajectory_ = std::make_unique<HandTrajectory>(kRoomM, duration_s, options.speed, options.seed);
       world = BuildRoom(kRoomM, options.seed);
       break;
     case Scene::kRobot:
@@ -213,13 +228,17 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
       break;
     }
     case Scene::kDesk:
-      trajectory_ = std::make_unique<DeskTrajectory>(options.duration_s, options.speed, options.seed);
+      trajectory_ = std::make_unique<DeskTrajectory>(duration_s, options.speed, options.seed);
       world = BuildDesk(options.seed);
       break;
     case Scene::kOffice:
-      trajectory_ = std::make_unique<OfficeTrajectory>(options.duration_s, options.speed, options.seed);
+      trajectory_ = std::make_unique<OfficeTrajectory>(duration_s, options.speed, options.seed);
       world = BuildDesk(options.seed, 4.4, 3.2);
-      AddPeople(static_cast<int>(options.people), options.duration_s, options.seed, world);
+      AddPeople(static_cast<int>(options.people), duration_s, options.seed, world);
+      break;
+    case Scene::kFlight:
+      trajectory_ = std::make_unique<FlightTrajectory>(duration_s, options.speed, options.seed, options.bumps);
+      world = BuildHall(options.seed);
       break;
     case Scene::kWalk: {
       const StreetPlan plan = PlanStroll(options.seed, options.length_m);
@@ -260,7 +279,13 @@ Rigid3 Simulation::WorldFromCameraAtRow(FrameId frame, double row) const {
 }
 
 void Simulation::RenderEye(double time_s, double right_m, Rendering& out) {
-  const Rigid3 left_from_eye{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}};
+  Rigid3 left_from_eye{Eigen::Quaterniond::Identity(), {right_m, 0.0, 0.0}};
+  // Half of such small angles is the vector part of a quaternion.
+  constexpr double kHalfDegree = 0.00872664626;
+  if (right_m > 0.0) {
+    const Eigen::Quaterniond turned(1.0, 0.0, -kHalfDegree * options_.squint, kHalfDegree * options_.twist);
+    left_from_eye.rotation = turned.normalized();
+  }
   if (readout_s_ == 0.0) {
     renderer_->Render(camera_, trajectory_->WorldFromCamera(time_s) * left_from_eye, time_s, out, left_from_eye);
     return;

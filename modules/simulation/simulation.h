@@ -14,11 +14,23 @@
 namespace tessera {
 
 struct SimulationOptions {
-  enum class Scene { kStreet, kStreetShort, kTraffic, kHighway, kRoom, kCountry, kWalk, kDesk, kOffice, kRobot };
+  enum class Scene {
+    kStreet,
+    kStreetShort,
+    kTraffic,
+    kHighway,
+    kRoom,
+    kCountry,
+    kWalk,
+    kDesk,
+    kOffice,
+    kRobot,
+    kFlight
+  };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;            // another seed, another town
   double length_m = 0.0;        // of a drive; 0: all of it
-  double duration_s = 20.0;     // of the hand's way in the room or at the desk
+  double duration_s = 0.0;      // of the way in the room, at the desk or in the hall; 0: 20 s, or 60 s of flight
   double speed = 1.0;           // times the usual
   double noise = 1.0;           // times the usual noise of sensors
   double scale = 1.0;           // times the usual size of images
@@ -27,6 +39,9 @@ struct SimulationOptions {
   double stop_m = 12.0;         // traffic: it stops so far before the middle of a crossing
   double body = 0.0;            // share of the image's height that shows the car or robot itself, at the bottom
   double people = 3.0;          // office: who walks around
+  double bumps = 0.0;           // flight: how hard it is knocked three times; 0.3: by 45 degrees
+  double squint = 0.0;          // stereo: degrees by which the right camera is turned inwards, which nobody is told
+  double twist = 0.0;           // likewise about its optical axis
   double stamp = 0.0;           // 1: the time is written into the image, as dashcams do
   std::string path;             // a drive along the poses of a KITTI file instead of through the town
 
@@ -34,9 +49,8 @@ struct SimulationOptions {
   Result<> Check() const;
 };
 
-// Reads the name of a world (street, street-short, traffic, highway, room, country, walk, desk, office,
-// robot) and options
-// behind it: "street,seed=3,length=500". Throws InputError.
+// Reads the name of a world (street, street-short, traffic, highway, room, country, walk, desk, office, robot, flight)
+// and options behind it: "street,seed=3,length=500". Throws InputError.
 SimulationOptions ParseSimulation(const std::string& text);
 
 class Simulation {

@@ -118,6 +118,9 @@ World BuildRoom(const Eigen::Vector3d& room_m, uint32_t seed);
 // A desk at the origin, 0.72 m high, seen from where z is negative; a room around it, up to `near_m` before the desk
 // and twice `half_width_m` wide.
 World BuildDesk(uint32_t seed, double near_m = 3.0, double half_width_m = 2.4);
+// A hall of 14 x 5 x 11 m around the origin, machines and crates along its walls and one in its middle, pipes under its
+// ceiling; three lamps leave most of it dark.
+World BuildHall(uint32_t seed);
 // Besides, people who walk around before the desk for `duration_s`, stop and go on, and a chair that one of them moves.
 void AddPeople(int num_people, double duration_s, uint32_t seed, World& world);
 
