@@ -19,6 +19,8 @@ class HiddenScene {
  public:
   // Also for some time after the scene was seen again: what hid it may do so once more.
   bool is_hidden() const { return hidden_us_.has_value(); }
+  // Whether there have been confirmed points: without, nothing tells what hides the scene from the scene.
+  bool is_known() const { return confirmed_us_.has_value(); }
   // Whether confirmed points agreed with a pose a moment ago.
   bool WasConfirmed(int64_t utime_us) const;
 

@@ -452,7 +452,7 @@ bool MapTracker::NoteLoss(const Frame& view) {
   const int64_t utime_us = view->features().utime_us;
   if (!lost_since_us_) {
     lost_since_us_ = utime_us;
-    if (last_ && StoodStill()) scene_.Hide(utime_us);
+    if (last_ && scene_.is_known() && StoodStill()) scene_.Hide(utime_us);
   }
   if (last_ && !lost_way_.has_begun()) BeginLostWay();
   if (lost_way_.has_begun() && !scene_.is_hidden()) lost_way_.Add(view);

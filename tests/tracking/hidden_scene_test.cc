@@ -37,6 +37,14 @@ TEST_F(HiddenSceneTest, ASteadyMotionThatGoesOnCountsMore) {
   EXPECT_FALSE(scene_.IsBehind(PoseWith(20, 20), kGoesOn, 4 * kSecond));
 }
 
+// A drone that is knocked over before it has ever flown: what it sees then is as good as what it saw before.
+TEST_F(HiddenSceneTest, IsKnownOnceConfirmedPointsWereSeen) {
+  EXPECT_TRUE(scene_.is_known());
+  HiddenScene young;
+  young.See(PoseWith(0, 0), kSecond);
+  EXPECT_FALSE(young.is_known());
+}
+
 TEST_F(HiddenSceneTest, WhereTheyAreGoneAJumpHidesIt) {
   EXPECT_TRUE(scene_.IsBehind(PoseWith(2, 2), kJumps, kSecond));
   EXPECT_TRUE(scene_.IsBehind(PoseWith(20, 25), kJumps, kSecond)) << "few of many points, where they were the half";
