@@ -10,6 +10,14 @@ Result<> CheckRange(const char* name, int value, int lowest, int highest) {
                 " and " + std::to_string(highest));
 }
 
+void MoveRightColumns(const CameraCalibration& from, const CameraCalibration& to, std::vector<Keypoint>& keypoints) {
+  for (Keypoint& keypoint : keypoints) {
+    if (keypoint.right_x_px < 0.0F) continue;
+    const Eigen::Vector2d pixel(keypoint.x_px, keypoint.y_px);
+    keypoint.right_x_px += static_cast<float>(RightShiftAt(to, pixel) - RightShiftAt(from, pixel));
+  }
+}
+
 }  // namespace
 
 Result<> FeatureOptions::Check() const {
@@ -22,6 +30,9 @@ Result<> FeatureOptions::Check() const {
 FeatureFrame WithLens(FeatureFrame features, const LensCorrection& lens) {
   const CameraCalibration seen = features.calibration;
   features.calibration = WithLens(seen, lens);
+  if (features.calibration.right_shift != seen.right_shift) {
+    MoveRightColumns(seen, features.calibration, features.keypoints);
+  }
   if (features.calibration.radial == seen.radial) return features;
   for (Keypoint& keypoint : features.keypoints) {
     const Eigen::Vector2d pixel = BeforeLens(seen, seen.radial, {keypoint.x_px, keypoint.y_px});

@@ -76,8 +76,8 @@ struct FeatureFrame {
   std::vector<Descriptor> descriptors;
 };
 
-// What the camera saw, with this correction of its lens: keypoints stand where they would have been seen without the
-// distortion, and the calibration says so. Itself where none is known.
+// What the camera saw, with this correction of its lens: keypoints and right columns stand where they would have been
+// seen if the calibration were right, and the calibration says so. Itself where none is known.
 FeatureFrame WithLens(FeatureFrame features, const LensCorrection& lens);
 
 // One unit of work: detect and describe the candidates of one tile, over a range of pyramid levels.

@@ -37,6 +37,13 @@ Result<> CameraCalibration::Check() const {
   return {};
 }
 
+double RightShiftAt(const CameraCalibration& calibration, const Eigen::Vector2d& pixel) {
+  const RightShift& shift = calibration.right_shift;
+  const double half_width_px = 0.5 * calibration.width_px;
+  const double x = (pixel.x() - calibration.cx_px) / half_width_px, y = (pixel.y() - calibration.cy_px) / half_width_px;
+  return shift.center_px + shift.across_px * x + shift.down_px * y + shift.bend_px * x * x;
+}
+
 Eigen::Vector2d MovedByLens(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d center(calibration.cx_px, calibration.cy_px);
   const double half_width_px = 0.5 * calibration.width_px;

@@ -21,6 +21,19 @@ enum class SensorType { kMono = 0, kStereo = 1, kRgbd = 2 };
 // "mono", "stereo", "rgbd"
 std::string ToString(SensorType sensor);
 
+// By how much the columns of a stereo pair's right image were moved to the right, since they turned out to stand beside
+// where the calibration has them. With x, y from the image's center to the right and down, in halves of its width:
+//
+//   center + across x + down y + bend x^2                                                            [px]
+//
+// A camera that is turned by a small angle about its y axis (it squints) has center and bend, about its z axis down.
+struct RightShift {
+  double center_px = 0.0, across_px = 0.0, down_px = 0.0, bend_px = 0.0;
+
+  bool operator==(const RightShift&) const = default;
+  bool is_zero() const { return *this == RightShift{}; }
+};
+
 struct CameraCalibration {
   SensorType sensor = SensorType::kMono;
   int width_px = 0;
@@ -34,6 +47,7 @@ struct CameraCalibration {
   // By which share points at the image's left or right edge were moved away from the center, since the images turned
   // out to be distorted (MovedByLens). 0: they stand where they were seen.
   double radial = 0.0;
+  RightShift right_shift;  // of a stereo pair
 
   bool operator==(const CameraCalibration&) const = default;
 
@@ -55,6 +69,7 @@ struct LensCorrection {
   double fx_px = 0.0;  // focal lengths; 0: as calibrated
   double fy_px = 0.0;
   double radial = 0.0;  // as CameraCalibration::radial
+  RightShift right_shift;
 
   bool is_known() const { return fx_px > 0.0; }
   bool operator==(const LensCorrection&) const = default;
@@ -64,6 +79,8 @@ struct LensCorrection {
 inline constexpr double kMaxFocalError = 0.03;
 // Likewise CameraCalibration::radial, either way.
 inline constexpr double kMaxRadial = 0.03;
+// Likewise each number of RightShift: a right camera that squints by half a degree, or is turned by that.
+inline constexpr double kMaxRightShift_px = 8.0;
 
 // By which share of the calibration's focal lengths those of the correction differ; 0 where none are known.
 inline double FocalError(const LensCorrection& lens, const CameraCalibration& calibration) {
@@ -73,9 +90,13 @@ inline double FocalError(const LensCorrection& lens, const CameraCalibration& ca
 // The calibration with this correction; itself where none is known.
 inline CameraCalibration WithLens(CameraCalibration calibration, const LensCorrection& lens) {
   if (!lens.is_known()) return calibration;
-  std::tie(calibration.fx_px, calibration.fy_px, calibration.radial) = std::tuple(lens.fx_px, lens.fy_px, lens.radial);
+  std::tie(calibration.fx_px, calibration.fy_px, calibration.radial, calibration.right_shift) =
+      std::tuple(lens.fx_px, lens.fy_px, lens.radial, lens.right_shift);
   return calibration;
 }
+
+// Of the column at which the right image shows what the left one shows at `pixel`.
+double RightShiftAt(const CameraCalibration& calibration, const Eigen::Vector2d& pixel);
 
 // Where a pixel stands in an image whose distortion is corrected by `radial`, with r = |pixel - center| over half the
 // image's width:

@@ -42,6 +42,10 @@ uint64_t HashOf(const FeatureFrame& features) {
     hash.Add(number);
   }
   if (camera.radial != 0.0) hash.Add(camera.radial);  // most cameras have none: maps made before keep their hashes
+  if (!camera.right_shift.is_zero()) {
+    const RightShift& shift = camera.right_shift;
+    hash.Add(shift.center_px).Add(shift.across_px).Add(shift.down_px).Add(shift.bend_px);
+  }
   for (size_t i = 0; i < features.keypoints.size(); ++i) {
     const Keypoint& k = features.keypoints[i];
     hash.Add(uint64_t{std::bit_cast<uint32_t>(k.x_px)} << 32 | std::bit_cast<uint32_t>(k.y_px));

@@ -190,6 +190,7 @@ bool Mapper::RefineLens(const KeyframeObservation& seen, MapEditor& editor) {
   const CameraCalibration& given = seen.features.calibration;
   if (!options_.refines_focal || !lens_refiner_.Refine(seen.id, given, editor)) return false;
   NoteCorrected(seen.id);
+  wants_adjustment_ |= given.sensor == SensorType::kStereo;  // what is older was mapped with columns that have moved
   return true;
 }
 

@@ -107,6 +107,7 @@ Result<> OccupancySession::Receive(const KeyframeObservation& keyframe) {
   const FrameId frame = keyframe.features.frame;
   announced_.erase(frame);
   keyframe_at_[frame] = keyframe.id;
+  right_shift_at_[frame] = keyframe.features.calibration.right_shift;
   camera_ = keyframe.features.calibration;
   if (!occupancy_) {
     const OccupancyOptions fitted = FitToSensor(options_.map, *camera_);
@@ -183,8 +184,10 @@ bool OccupancySession::MakeScan() {
   ColorImage color = TakeColor(*id);
   if (!images || !HasImages(*images, *camera_)) return true;
   if (color.width != camera_->width_px || color.height != camera_->height_px) color = {};
+  CameraCalibration camera = *camera_;
+  camera.right_shift = right_shift_at_.at(*id);
   scans_[keyframe_at_.at(*id)] = std::make_shared<const Scan>(
-      ScanFromImages(*images, color, *camera_, occupancy_->options(), options_.max_disparity_px));
+      ScanFromImages(*images, color, camera, occupancy_->options(), options_.max_disparity_px));
   has_map_changed_ = true;
   return true;
 }

@@ -65,7 +65,9 @@ DepthImage DepthOfStereo(const CameraFrame& frame, const CameraCalibration& came
     uint16_t* counts = depth.row(y);
     for (int x = 0; x < depth.width; ++x) {
       if (disparity[x] <= 0 || disparity[x] > 16 * x) continue;
-      const double depth_m = 16.0 * camera.fx_px * camera.baseline_m / disparity[x];
+      const double disparity_px = disparity[x] / 16.0 - RightShiftAt(camera, {x, y});
+      if (disparity_px <= 0.0) continue;
+      const double depth_m = camera.fx_px * camera.baseline_m / disparity_px;
       counts[x] = static_cast<uint16_t>(std::min(kMaxCount, std::round(depth_m / unit_m)));
     }
   }

@@ -9,15 +9,6 @@ namespace {
 
 constexpr double kFocalStep = 0.01, kRadialStep = 0.004;    // of the parabolas
 constexpr double kFocalSigma = 0.01, kRadialSigma = 0.004;  // of calibrations
-constexpr double kImagesVariance = 4.0;
-
-// All observations take part, whichever focal length they would agree with.
-BundleOptions OneRound() {
-  BundleOptions options = GlobalBundleOptions();
-  options.num_rounds = 1;
-  options.function_tolerance = 1e-6;
-  return options;
-}
 
 // Of the area around a pixel that MovedByLens moves, as a length: how much longer it is thereafter.
 double Magnification(const CameraCalibration& calibration, double radial, const Eigen::Vector2d& pixel) {
@@ -37,9 +28,16 @@ Parabola Through(double before, double same, double after, double step) {
 
 }  // namespace
 
+BundleOptions LeastCostOptions() {
+  BundleOptions options = GlobalBundleOptions();
+  options.num_rounds = 1;
+  options.function_tolerance = 1e-6;
+  return options;
+}
+
 LensCorrection CorrectedBy(const LensError& error, const CameraCalibration& calibration) {
   return {calibration.fx_px * (1.0 + error.focal), calibration.fy_px * (1.0 + error.focal),
-          calibration.radial + error.radial};
+          calibration.radial + error.radial, calibration.right_shift};
 }
 
 BundleProblem WithLensError(BundleProblem problem, const LensError& error) {
@@ -60,7 +58,7 @@ double LensEstimator::LeastCost(int focal_steps, int radial_steps) {
   std::optional<double>& cost = least_costs_.at(static_cast<size_t>(3 * (focal_steps + 1) + radial_steps + 1));
   if (!cost) {
     const LensError error{focal_steps * kFocalStep, radial_steps * kRadialStep};
-    const std::optional<BundleResult> result = AdjustBundle(WithLensError(problem_, error), OneRound());
+    const std::optional<BundleResult> result = AdjustBundle(WithLensError(problem_, error), LeastCostOptions());
     cost = result ? result->final_cost : std::nan("");
   }
   return *cost;

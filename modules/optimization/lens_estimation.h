@@ -19,6 +19,11 @@ struct LensError {
   double radial = 0.0;  // CameraCalibration::radial, which calibrations take to be 0
 };
 
+// Estimates of one camera differ by twice what the curvature of their costs says: the variance grows by this.
+inline constexpr double kImagesVariance = 4.0;
+// For a least cost that all observations take part in, whichever camera they would agree with.
+BundleOptions LeastCostOptions();
+
 // What one problem says of its lens. Costs that both estimates need are computed once.
 class LensEstimator {
  public:

@@ -40,6 +40,7 @@ KeyframeObservation ObserveKeyframe(KeyframeId id, const LocalizedFrame& localiz
   keyframe.features = frame.view->features();
   keyframe.features.calibration = given;
   keyframe.features.calibration.radial = frame.view->calibration().radial;
+  keyframe.features.calibration.right_shift = frame.view->calibration().right_shift;
   keyframe.world_from_camera = frame.world_from_camera;
   keyframe.reference = reference.id;
   keyframe.reference_from_camera = localized.reference_from_camera;

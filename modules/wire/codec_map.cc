@@ -82,6 +82,7 @@ struct Layout<map_change_t> {
                  "its focal lengths are out of range");
     fields(message.radial, delta.lens.radial);
     fields.Check(IsRadial(delta.lens.radial), "its radial distortion is out of range");
+    DescribeRightShift(fields, message, delta.lens.right_shift);
     fields.CutList(message.num_new_keyframes, message.new_keyframes, delta.new_keyframes);
     auto& moved = delta.moved_keyframes;
     fields.Table(

@@ -83,6 +83,10 @@ Result<> ReadField(const rigid3_t& field, Rigid3& transform) {
 bool IsScale(double scale) { return scale > 1e-9 && scale < 1e9; }
 
 bool IsRadial(double radial) { return std::abs(radial) <= kMaxRadial; }
+bool IsRightShift(const RightShift& shift) {
+  return std::abs(shift.center_px) <= kMaxRightShift_px && std::abs(shift.across_px) <= kMaxRightShift_px &&
+         std::abs(shift.down_px) <= kMaxRightShift_px && std::abs(shift.bend_px) <= kMaxRightShift_px;
+}
 
 void WriteField(const Sim3& transform, sim3_t& field) {
   rigid3_t pose;

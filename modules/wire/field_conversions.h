@@ -104,6 +104,7 @@ void WriteField(const Sim3& transform, sim3_t& field);
 Result<> ReadField(const sim3_t& field, Sim3& transform);
 bool IsScale(double scale);
 bool IsRadial(double radial);  // of a lens
+bool IsRightShift(const RightShift& shift);
 
 // Both are checked as their Check() does.
 void WriteField(const CameraCalibration& calibration, camera_model_t& field);

@@ -13,6 +13,15 @@ inline bool IsInRange(const Keypoint& keypoint, const CameraCalibration& camera)
   return IsNearImage(keypoint, camera) && keypoint.level < kMaxLevels && keypoint.depth_m >= 0.0F;
 }
 
+template <class Fields, class Message, class Shift>
+void DescribeRightShift(Fields& fields, Message& message, Shift& shift) {
+  fields(message.right_shift[0], shift.center_px);
+  fields(message.right_shift[1], shift.across_px);
+  fields(message.right_shift[2], shift.down_px);
+  fields(message.right_shift[3], shift.bend_px);
+  fields.Check(IsRightShift(shift), "its right columns are moved too far");
+}
+
 // `more`: columns of the enclosing message with one item for each keypoint.
 template <class Fields, class Message, class Frame, class... More>
 void DescribeKeypoints(Fields& fields, Message& message, Frame& frame, More... more) {
@@ -22,6 +31,7 @@ void DescribeKeypoints(Fields& fields, Message& message, Frame& frame, More... m
   fields(message.camera, frame.calibration);
   fields(message.radial, frame.calibration.radial);
   fields.Check(IsRadial(frame.calibration.radial), "its radial distortion is out of range");
+  DescribeRightShift(fields, message, frame.calibration.right_shift);
   fields.Check(frame.frame.valid(), "its frame number is negative");
   auto& keypoints = frame.keypoints;
   fields.WholeTable(

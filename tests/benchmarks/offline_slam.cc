@@ -172,7 +172,9 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
   std::printf("RMS error %.4f m, live %.4f m\n", RmsError(optimized, sequence.ground_truth, is_mono).value_or(-1.0),
               RmsError(run.Live(), sequence.ground_truth, is_mono).value_or(-1.0));
   std::printf("readout %.1f ms, depths %.1f ms later\n", 1e3 * run.readout_s, 1e3 * run.depth_delay_s);
-  std::printf("lens found: fx %.2f px (0: as calibrated), radial %+.4f\n", map.lens().fx_px, map.lens().radial);
+  std::printf("lens found: fx %.2f px (0: as calibrated), radial %+.4f, right %+.3f %+.3f %+.3f %+.3f\n",
+              map.lens().fx_px, map.lens().radial, map.lens().right_shift.center_px, map.lens().right_shift.across_px,
+              map.lens().right_shift.down_px, map.lens().right_shift.bend_px);
   if (is_mono) ReportDoubtfulScale(run.poses);
   if (const auto scale = is_mono ? MeasureScale(optimized, sequence.ground_truth) : std::nullopt) {
     std::printf("scale: greatest change within 10 s %.3f, until %.1f s; typical change over 5 s %.3f\n",

@@ -48,5 +48,29 @@ TEST(Lens, FeaturesSayWhereTheyWereMoved) {
   EXPECT_EQ(WithLens(moved, {490.0, 480.0, 0.01}).keypoints, moved.keypoints);
 }
 
+TEST(Lens, RightColumnsAreMovedAndComeBack) {
+  FeatureFrame seen;
+  seen.calibration = Camera();
+  seen.calibration.sensor = SensorType::kStereo;
+  // At the center, half a width to the right of it, half a width below it (not in the image), and without a match.
+  seen.keypoints = {{.x_px = 321.5F, .y_px = 239.0F, .right_x_px = 300.0F},
+                    {.x_px = 641.5F, .y_px = 239.0F, .right_x_px = 600.0F},
+                    {.x_px = 321.5F, .y_px = 559.0F, .right_x_px = 300.0F},
+                    {.x_px = 321.5F, .y_px = 239.0F}};
+  LensCorrection lens{500.0, 490.0, 0.0, {.center_px = 1.0, .across_px = 0.25, .down_px = -0.5, .bend_px = 2.0}};
+  const FeatureFrame moved = WithLens(seen, lens);
+  EXPECT_EQ(moved.calibration.right_shift, lens.right_shift);
+  EXPECT_NEAR(moved.keypoints[0].right_x_px, 301.0, 1e-4);
+  EXPECT_NEAR(moved.keypoints[1].right_x_px, 603.25, 1e-4);
+  EXPECT_NEAR(moved.keypoints[2].right_x_px, 300.5, 1e-4);
+  EXPECT_EQ(moved.keypoints[3], seen.keypoints[3]);
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(moved.keypoints[i].x_px, seen.keypoints[i].x_px);
+  EXPECT_EQ(WithLens(moved, lens).keypoints, moved.keypoints);
+  lens.right_shift = {};
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(WithLens(moved, lens).keypoints[i].right_x_px, seen.keypoints[i].right_x_px, 1e-4);
+  }
+}
+
 }  // namespace
 }  // namespace tessera

@@ -12,11 +12,16 @@ namespace {
 // A map of a camera whose calibration gives focal lengths that are wrong by `error`.
 class MiscalibratedMap {
  public:
-  MiscalibratedMap(SensorType sensor, double error, int64_t num_keyframes = 40)
+  MiscalibratedMap(SensorType sensor, double error, int64_t num_keyframes = 40, float right_error_px = 0.0F)
       : world_(sensor, 0.3, 6000), planted_(world_), given_(world_.calibration()) {
     given_ = WithLens(given_, {given_.fx_px * (1.0 + error), given_.fy_px * (1.0 + error)});
     for (int64_t k = 0; k < num_keyframes; ++k) {
-      planted_.Add(2 * k, {k - 1}, 0, {}, [&](FeatureFrame& features) { features.calibration = given_; });
+      planted_.Add(2 * k, {k - 1}, 0, {}, [&](FeatureFrame& features) {
+        features.calibration = given_;
+        for (Keypoint& keypoint : features.keypoints) {
+          if (keypoint.right_x_px >= 0.0F) keypoint.right_x_px += right_error_px;
+        }
+      });
     }
   }
 
@@ -81,10 +86,38 @@ TEST(LensRefiner, DoubtsWhatNoCalibrationIsWrongBy) {
   EXPECT_LT(far.refiner().doubt(), -0.03);
 }
 
-TEST(LensRefiner, NeedsATurnAndAMonoCamera) {
-  MiscalibratedMap straight(SensorType::kMono, 0.02, 22), stereo(SensorType::kStereo, 0.02);
+TEST(LensRefiner, NeedsATurnWithOneCamera) {
+  MiscalibratedMap straight(SensorType::kMono, 0.02, 22);
   EXPECT_FALSE(straight.Look(2).lens().is_known());
-  EXPECT_FALSE(stereo.Look(2).lens().is_known());
+}
+
+// The second look at the same keyframes sees nothing new, but what the correction of the first has left.
+TEST(LensRefiner, MovesTheColumnsOfARightCameraThatSquints) {
+  MiscalibratedMap squints(SensorType::kStereo, 0.0, 40, 1.0F);
+  Map replica;
+  for (const MapDelta& delta : squints.planted().deltas()) ASSERT_TRUE(replica.Apply(delta));
+  EXPECT_FALSE(squints.Look(1).lens().is_known());
+  ASSERT_TRUE(replica.Apply(squints.delta()));
+  EXPECT_TRUE(squints.Look(1).lens().is_known());
+  ASSERT_TRUE(replica.Apply(squints.delta()));
+  const Map& map = squints.Look(4);
+  EXPECT_EQ(map.lens().fx_px, squints.true_fx());
+  EXPECT_NEAR(map.lens().right_shift.center_px, -1.0, 0.15);
+  EXPECT_LT(squints.planted().WorstKeyframe(map), 0.2);
+  EXPECT_EQ(squints.refiner().right_shift_doubt_px(), 0.0);
+  ASSERT_TRUE(replica.Apply(squints.delta()));
+  EXPECT_EQ(replica.Sha256Hex(), map.Sha256Hex());
+}
+
+TEST(LensRefiner, LeavesARightPairAlone) {
+  MiscalibratedMap right(SensorType::kStereo, 0.0);
+  const uint64_t before = right.planted().map().hash();
+  EXPECT_EQ(right.Look(4).hash(), before);
+}
+
+TEST(LensRefiner, LeavesDepthImagesAlone) {
+  MiscalibratedMap rgbd(SensorType::kRgbd, 0.02);
+  EXPECT_FALSE(rgbd.Look(3).lens().is_known());
 }
 
 }  // namespace

@@ -324,7 +324,9 @@ Landmark DrawLandmark(std::mt19937& generator) {
 // Keyframes, landmarks, observations and loops: what a snapshot is made of.
 MapDelta DrawContent(std::mt19937& generator, int size) {
   MapDelta delta{.number = Draw(generator, 0, 99), .answers = {Draw(generator, -1, 99)}, .hash = generator()};
-  if (size > 0) delta.lens = {DrawReal(generator, 1, 999), DrawReal(generator, 1, 999), -0.0123};
+  if (size > 0) {
+    delta.lens = {DrawReal(generator, 1, 999), DrawReal(generator, 1, 999), -0.0123, {0.5, -0.25, 7.0, -2.0}};
+  }
   for (int i = 0; i < 3 * size; ++i) {
     auto features = std::make_shared<FeatureFrame>(DrawKeyframeFeatures(generator, i % 2));
     delta.new_keyframes.push_back(

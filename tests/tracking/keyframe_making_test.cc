@@ -35,12 +35,14 @@ TEST_P(KeyframeMaking, TheMapperGetsWhatTheFrameSeesByTheCameraOfTheSource) {
   FeatureFrame features = localized.frame.view->features();
   features.calibration.fx_px *= 1.01;  // as the mapper has found it
   features.calibration.radial = 0.02;
+  features.calibration.right_shift = {.center_px = 0.5};
   localized.frame.view = ViewOf(features);
   const KeyframeObservation keyframe = Observe(localized);
   EXPECT_EQ(keyframe.id, KeyframeId{4});
   EXPECT_EQ(keyframe.reference, KeyframeId{3});
   EXPECT_EQ(keyframe.features.calibration.fx_px, world_.calibration().fx_px);
   EXPECT_EQ(keyframe.features.calibration.radial, 0.02) << "keypoints stay where the lens moved them";
+  EXPECT_EQ(keyframe.features.calibration.right_shift.center_px, 0.5) << "right columns, too";
   ASSERT_EQ(keyframe.landmarks.size(), localized.frame.points.size());
   for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
     EXPECT_EQ(keyframe.landmarks[i], localized.frame.points[i].id.landmark);

@@ -165,6 +165,7 @@ TEST(Codec, FeaturesOutOfRangeAreRefused) {
   ExpectRefused<FeatureFrame>([](FeatureFrame& frame) { frame.keypoints[9].x_px = std::nanf(""); });
   ExpectRefused<FeatureFrame>([](FeatureFrame& frame) { frame.keypoints[9].y_px = 1e9F; });
   ExpectRefused<FeatureFrame>([](FeatureFrame& frame) { frame.keypoints[9].right_x_px = INFINITY; });
+  ExpectRefused<FeatureFrame>([](FeatureFrame& frame) { frame.calibration.right_shift.down_px = 8.5; });
   ExpectRefused<KeyframeObservation>([](KeyframeObservation& keyframe) { keyframe.landmarks[0].value = -2; });
   ExpectRefused<ExtractorReady>([](ExtractorReady& ready) { ready.extractor = -1; });
   ExpectRefused<TileAck>([](TileAck& ack) { ack.tiles[0] = -1; });
@@ -182,6 +183,8 @@ TEST(Codec, ChangesOfTheMapOutOfRangeAreRefused) {
   ExpectRefused<KeyframeObservation>(
       [](KeyframeObservation& keyframe) { keyframe.shared[0].position_in_other.x() = kNan; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.number = -1; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.lens.right_shift.across_px = -9.0; });
+  ExpectRefused<MapDelta>([](MapDelta& delta) { delta.lens.right_shift.bend_px = kNan; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.new_keyframes[1].id.value = -1; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.moved_keyframes[0].world_from_camera.translation.x() = kNan; });
   ExpectRefused<MapDelta>([](MapDelta& delta) { delta.changed_landmarks[0].landmark.normal.y() = INFINITY; });

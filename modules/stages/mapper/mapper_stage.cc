@@ -89,6 +89,12 @@ void MapperStage::Advance() {
   context_.SetValue("focal_error", session_.lens_refiner().error());
   context_.SetValue("lens_radial", session_.map().lens().radial);
   context_.SetValue("focal_doubt", session_.lens_refiner().doubt());
+  const RightShift& right = session_.map().lens().right_shift;
+  context_.SetValue("right_shift_px", right.center_px);
+  context_.SetValue("right_shift_across_px", right.across_px);
+  context_.SetValue("right_shift_down_px", right.down_px);
+  context_.SetValue("right_shift_bend_px", right.bend_px);
+  context_.SetValue("right_shift_doubt_px", session_.lens_refiner().right_shift_doubt_px());
 }
 
 void MapperStage::Do(const MapperActions& actions) {

@@ -119,7 +119,8 @@ def write_summary(folder: Path, facts: RunFacts, processes: ProcessFacts) -> Res
         + scale_warnings(result.frames, facts.sensor)
         + mending_warnings(evaluated)
         + agreement_warnings(result.frames, facts.sensor)
-        + focal_warnings(evaluated),
+        + focal_warnings(evaluated)
+        + right_image_warnings(evaluated),
         "doubts": scale_doubts(result.frames),
         "not_written": not_written,
         "versions": collect_versions(),
@@ -290,6 +291,25 @@ def focal_warnings(evaluated: dict[str, Any]) -> list[str]:
     return [
         f"The images of this mono camera fit focal lengths {focal_words(doubt)} than the calibration's, which were not "
         "used: check the calibration, its lens distortion too. In turns the scale may change."
+    ]
+
+
+def right_image_warnings(evaluated: dict[str, Any]) -> list[str]:
+    """Where the cameras of a stereo pair don't stand to each other as the calibration says."""
+    values = evaluated.get("stage_values", {}).get("mapper", {})
+    if doubt_px := values.get("right_shift_doubt_px"):
+        return [
+            f"Columns of the right image seem to stand {doubt_px:.1f} px beside where the calibration has them, which "
+            "is too much to be corrected: calibrate the stereo pair anew."
+        ]
+    names = ("", "_across", "_down", "_bend")
+    center, across, down, bend = (values.get(f"right_shift{name}_px", 0.0) for name in names)
+    if not (center or across or down or bend):
+        return []
+    return [
+        "The two cameras don't stand to each other as the calibration says. Columns of the right image were moved by "
+        f"{center:+.2f} {across:+.2f} x {down:+.2f} y {bend:+.2f} x^2 px, with x, y from the image's center in halves "
+        "of its width, as soon as that was found; depths before are less exact. Calibrate the stereo pair anew."
     ]
 
 

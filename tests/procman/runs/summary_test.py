@@ -20,6 +20,7 @@ from tessera_cli.runs.summary import (
     occupancy_sha256,
     occupancy_warnings,
     recording_warnings,
+    right_image_warnings,
     scale_doubts,
     scale_warnings,
     why_nothing_was_located,
@@ -122,6 +123,22 @@ def test_focal_lengths_that_no_calibration_explains_are_a_warning() -> None:
     assert focal_warnings({}) == focal_warnings({"stage_values": {"mapper": {"focal_doubt": 0.0}}}) == []
     (sentence,) = focal_warnings({"stage_values": {"mapper": {"focal_doubt": -0.046}}})
     assert "4.6 % shorter" in sentence and "not used" in sentence
+
+
+def test_what_the_right_image_was_moved_by_is_told() -> None:
+    assert right_image_warnings({}) == right_image_warnings({"stage_values": {"mapper": {"right_shift_px": 0.0}}}) == []
+    moved = {
+        "right_shift_px": -1.25,
+        "right_shift_across_px": 0.02,
+        "right_shift_down_px": -0.1,
+        "right_shift_bend_px": 0.9,
+    }
+    (sentence,) = right_image_warnings({"stage_values": {"mapper": moved}})
+    assert "moved by -1.25 +0.02 x -0.10 y +0.90 x^2 px" in sentence
+    assert "calibrate the stereo pair anew" in sentence.lower()
+    (sentence,) = right_image_warnings({"stage_values": {"mapper": {"right_shift_doubt_px": 9.5}}})
+    assert "9.5 px" in sentence
+    assert "too much" in sentence
 
 
 def test_a_scale_that_was_mended_is_told() -> None:
