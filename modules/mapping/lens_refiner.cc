@@ -16,7 +16,8 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaxKeyframes = 50;  // that a look takes in
+constexpr size_t kMaxKeyframes = 50;    // that a look takes in
+constexpr size_t kLandmarksOfPair = 3;  // one camera needs as many times more landmarks
 constexpr size_t kMinKeyframes = 20, kMinStereoKeyframes = 8;
 constexpr size_t kMinObservers = 3;  // of those, of a landmark
 constexpr int64_t kMinInterval = 10,
@@ -163,7 +164,7 @@ bool LensRefiner::RefineRightImage(const CameraCalibration& given, const std::ve
                                    MapEditor& editor) {
   const Map& map = editor.map();
   const CameraCalibration current = WithLens(given, map.lens());
-  const std::optional<RightShiftEquations> found = EquationsOfRightShift(ProblemOf(map, keyframes, max_landmarks_ / 3));
+  const std::optional<RightShiftEquations> found = EquationsOfRightShift(ProblemOf(map, keyframes, max_landmarks_ / kLandmarksOfPair));
   if (!found) return false;
   const Eigen::Vector4d known = NumbersOf(current.right_shift);
   if (!right_shift_) right_shift_ = UsualShift(known, given);

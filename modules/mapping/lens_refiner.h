@@ -1,9 +1,9 @@
 // Corrects by the map what a camera's calibration says wrongly.
 //
-// Of a mono camera, the focal lengths and the distortion. An error of a percent is usual even where
-// a camera was calibrated with care. One of the focal length costs little while the camera goes straight; but each turn
-// then changes the scale of the map, by 10 % in one of 90 degrees with an error of 2 % (KITTI 03). One of the
-// distortion changes it everywhere, as points come nearer and move outward.
+// Of a mono camera, the focal lengths and the distortion. An error of a percent is usual even where a camera was
+// calibrated with care. One of the focal length costs little while the camera goes straight; but each turn then changes
+// the scale of the map, by 10 % in one of 90 degrees with an error of 2 % (KITTI 03). One of the distortion changes it
+// everywhere, as points come nearer and move outward.
 //
 // Of a stereo pair, where columns of the right image stand: bolts give way, and cameras warm up. A right camera that
 // squints by a hundredth of a degree, a tenth of a pixel, bends a drive of 250 m by 0.2 m; nothing else shows it.
@@ -19,11 +19,11 @@
 
 namespace tessera {
 
-// Looks at the newest keyframes from time to time; with one camera, where it has turned. Two looks in a row that agree
-// are needed to change anything.
+// Looks at the newest keyframes from time to time. Of one camera, which must have turned, two looks in a row have to
+// agree before anything is changed; of a pair, looks are added up until the error is beyond doubt.
 class LensRefiner {
  public:
-  // A look takes in as many landmarks, those that most of the keyframes observe.
+  // A look takes in as many landmarks, those that most of the keyframes observe; with two cameras a third of them.
   explicit LensRefiner(size_t max_landmarks = 1500) : max_landmarks_(max_landmarks) {}
 
   // To be called before keyframe `next` is added; `given`: the calibration of the source. Where the lens changes, the
@@ -34,7 +34,7 @@ class LensRefiner {
   double error() const { return error_; }
   // Likewise what was found but not used, since no calibration is as wrong as that; 0: nothing.
   double doubt() const { return doubt_; }
-  // The widest shift of right columns that was found but not used, likewise, px.
+  // Likewise the largest number of a shift of right columns, px.
   double right_shift_doubt_px() const { return right_shift_doubt_px_; }
 
  private:
