@@ -16,24 +16,22 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaxKeyframes = 50;    // that a look takes in
-constexpr size_t kLandmarksOfPair = 3;  // one camera needs as many times more landmarks
-constexpr size_t kMinKeyframes = 20, kMinStereoKeyframes = 8;
-constexpr size_t kMinObservers = 3;  // of those, of a landmark
-constexpr int64_t kMinInterval = 10,
-                  kMinStereoInterval = 4;  // keyframes between looks; twice as many after each that finds no error
-constexpr int64_t kMaxInterval = 80;
-constexpr double kMinTurn_rad = 0.6;      // in all, of the keyframes
-constexpr double kMinError = 0.005;       // of a focal length, to be worth a change
-constexpr double kMinErrorLeft = 0.0025;  // likewise, of a calibration that is known to be wrong
-// Of right columns: what calibrations are wrong by, as standard deviations, at the center and the edge of the image;
-// what is worth a change, where it is widest, at first and later; and what is too much for a parabola.
+constexpr size_t kMaxKeyframes = 50;                            // that a look takes in
+constexpr size_t kMinKeyframes = 20, kMinKeyframesOfPair = 8;   // likewise
+constexpr size_t kMinObservers = 3;                             // of those, of a landmark
+constexpr size_t kLandmarksOfPair = 3;                          // one camera needs as many times more landmarks
+constexpr int64_t kMinInterval = 10, kMinIntervalOfPair = 4;    // keyframes between looks; twice as many after
+constexpr int64_t kMaxInterval = 80;                            // each that finds no error
+constexpr double kMinTurn_rad = 0.6;                            // of one camera, in all, of the keyframes
+constexpr double kMinError = 0.005, kMinErrorLeft = 0.0025;     // of a focal length, to be worth a change; the second
+                                                                // of a calibration that is known to be wrong
+constexpr double kMinSigmas = 5.0;                              // and beyond doubt
+constexpr double kMaxSigmasApart = 3.0;                         // two looks
+constexpr double kMinShift_px = 0.04, kMinShiftLeft_px = 0.02;  // likewise of right columns, where it is widest
+constexpr double kMinSigmasOfPair = 7.0, kMinSigmasLeftOfPair = 1.0;  // right pairs reach 4.8, a rolling shutter 6.4
+constexpr double kLargeChange_px = 0.2;                               // the costs are no parabola over more
+// What calibrations are wrong by, as standard deviations: a turn of the right camera, and each number besides.
 constexpr double kTurnSigma_px = 0.5, kShiftSigma_px = 0.25, kBendSigma_px = 0.1;
-constexpr double kMinShift_px = 0.04, kMinShiftLeft_px = 0.02, kLargeChange_px = 0.2;
-// Of right pairs 4.8 have been seen, of one with a rolling shutter 6.4; once it is known to be wrong, the best is best.
-constexpr double kMinRightSigmas = 7.0, kMinRightSigmasLeft = 1.0;
-constexpr double kMinSigmas = 5.0;       // and beyond doubt
-constexpr double kMaxSigmasApart = 3.0;  // two looks
 
 // The newest keyframes of the newest part of the map.
 std::vector<KeyframeId> NewestKeyframes(const Map& map) {
@@ -125,9 +123,9 @@ bool LensRefiner::Refine(KeyframeId next, const CameraCalibration& given, MapEdi
   const std::vector<KeyframeId> keyframes = NewestKeyframes(map);
   looked_ = next;
   const bool is_stereo = given.sensor == SensorType::kStereo;
-  min_interval_ = is_stereo ? kMinStereoInterval : kMinInterval;
+  min_interval_ = is_stereo ? kMinIntervalOfPair : kMinInterval;
   next_look_ = {next.value + min_interval_};
-  if (keyframes.size() < (is_stereo ? kMinStereoKeyframes : kMinKeyframes)) return false;
+  if (keyframes.size() < (is_stereo ? kMinKeyframesOfPair : kMinKeyframes)) return false;
   if (is_stereo) return RefineRightImage(given, keyframes, editor);
   return TurnOf(map, keyframes) >= kMinTurn_rad && RefineFocal(given, keyframes, editor);
 }
@@ -164,7 +162,8 @@ bool LensRefiner::RefineRightImage(const CameraCalibration& given, const std::ve
                                    MapEditor& editor) {
   const Map& map = editor.map();
   const CameraCalibration current = WithLens(given, map.lens());
-  const std::optional<RightShiftEquations> found = EquationsOfRightShift(ProblemOf(map, keyframes, max_landmarks_ / kLandmarksOfPair));
+  const std::optional<RightShiftEquations> found =
+      EquationsOfRightShift(ProblemOf(map, keyframes, max_landmarks_ / kLandmarksOfPair));
   if (!found) return false;
   const Eigen::Vector4d known = NumbersOf(current.right_shift);
   if (!right_shift_) right_shift_ = UsualShift(known, given);
@@ -183,8 +182,8 @@ bool LensRefiner::RefineRightImage(const CameraCalibration& given, const std::ve
   const double sigmas = std::sqrt(error.dot(equations.information * error));
   const double error_px = WidestShift(error, given);
   const bool is_first = current.right_shift.is_zero();
-  const bool is_error = is_first ? sigmas >= kMinRightSigmas && error_px >= kMinShift_px
-                                 : sigmas >= kMinRightSigmasLeft && error_px >= kMinShiftLeft_px;
+  const bool is_error = is_first ? sigmas >= kMinSigmasOfPair && error_px >= kMinShift_px
+                                 : sigmas >= kMinSigmasLeftOfPair && error_px >= kMinShiftLeft_px;
   const bool is_large = error_px > kLargeChange_px;
   Plan(is_error && (is_first || is_large));
   if (!is_error || (is_first && num_right_looks_ < 2)) return false;
