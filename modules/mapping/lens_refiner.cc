@@ -16,20 +16,25 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kMaxKeyframes = 50;                            // that a look takes in
-constexpr size_t kMinKeyframes = 20, kMinKeyframesOfPair = 8;   // likewise
-constexpr size_t kMinObservers = 3;                             // of those, of a landmark
-constexpr size_t kLandmarksOfPair = 3;                          // one camera needs as many times more landmarks
-constexpr int64_t kMinInterval = 10, kMinIntervalOfPair = 4;    // keyframes between looks; twice as many after
-constexpr int64_t kMaxInterval = 80;                            // each that finds no error
-constexpr double kMinTurn_rad = 0.6;                            // of one camera, in all, of the keyframes
-constexpr double kMinError = 0.005, kMinErrorLeft = 0.0025;     // of a focal length, to be worth a change; the second
-                                                                // of a calibration that is known to be wrong
-constexpr double kMinSigmas = 5.0;                              // and beyond doubt
-constexpr double kMaxSigmasApart = 3.0;                         // two looks
-constexpr double kMinShift_px = 0.04, kMinShiftLeft_px = 0.02;  // likewise of right columns, where it is widest
-constexpr double kMinSigmasOfPair = 7.0, kMinSigmasLeftOfPair = 1.0;  // right pairs reach 4.8, a rolling shutter 6.4
-constexpr double kLargeChange_px = 0.2;                               // the costs are no parabola over more
+// What a look takes in. A pair of cameras needs fewer keyframes, and a third of the landmarks.
+constexpr size_t kMaxKeyframes = 50;
+constexpr size_t kMinKeyframes = 20, kMinKeyframesOfPair = 8;
+constexpr size_t kMinObservers = 3;  // of those, of a landmark
+constexpr size_t kLandmarksOfPair = 3;
+constexpr double kMinTurn_rad = 0.6;  // of one camera, in all, of the keyframes
+// Keyframes between looks; twice as many after each that finds no error.
+constexpr int64_t kMinInterval = 10, kMinIntervalOfPair = 4;
+constexpr int64_t kMaxInterval = 80;
+// An error of a focal length that is worth a change, at first and of a calibration that is known to be wrong; beyond
+// doubt; and how far apart two looks may be.
+constexpr double kMinError = 0.005, kMinErrorLeft = 0.0025;
+constexpr double kMinSigmas = 5.0;
+constexpr double kMaxSigmasApart = 3.0;
+// The same of right columns, where they are moved furthest. Right pairs reach 4.8 standard deviations, one with a
+// rolling shutter 6.4; once it is known to be wrong, the best is best.
+constexpr double kMinShift_px = 0.04, kMinShiftLeft_px = 0.02;
+constexpr double kMinSigmasOfPair = 7.0, kMinSigmasLeftOfPair = 1.0;
+constexpr double kLargeChange_px = 0.2;  // the costs are no parabola over more
 // What calibrations are wrong by, as standard deviations: a turn of the right camera, and each number besides.
 constexpr double kTurnSigma_px = 0.5, kShiftSigma_px = 0.25, kBendSigma_px = 0.1;
 

@@ -86,9 +86,10 @@ TEST(LensRefiner, DoubtsWhatNoCalibrationIsWrongBy) {
   EXPECT_LT(far.refiner().doubt(), -0.03);
 }
 
-TEST(LensRefiner, NeedsATurnWithOneCamera) {
-  MiscalibratedMap straight(SensorType::kMono, 0.02, 22);
+TEST(LensRefiner, NeedsATurnAndAMonoCamera) {
+  MiscalibratedMap straight(SensorType::kMono, 0.02, 22), stereo(SensorType::kStereo, 0.02);
   EXPECT_FALSE(straight.Look(2).lens().is_known());
+  EXPECT_FALSE(stereo.Look(2).lens().is_known());
 }
 
 // The second look at the same keyframes sees nothing new, but what the correction of the first has left.
