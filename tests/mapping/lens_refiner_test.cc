@@ -9,11 +9,13 @@
 namespace tessera {
 namespace {
 
+constexpr int kNumLandmarks = 4000;
+
 // A map of a camera whose calibration gives focal lengths that are wrong by `error`.
 class MiscalibratedMap {
  public:
   MiscalibratedMap(SensorType sensor, double error, int64_t num_keyframes = 40, float right_error_px = 0.0F)
-      : world_(sensor, 0.3, 6000), planted_(world_), given_(world_.calibration()) {
+      : world_(sensor, 0.3, kNumLandmarks), planted_(world_), given_(world_.calibration()) {
     given_ = WithLens(given_, {given_.fx_px * (1.0 + error), given_.fy_px * (1.0 + error)});
     for (int64_t k = 0; k < num_keyframes; ++k) {
       planted_.Add(2 * k, {k - 1}, 0, {}, [&](FeatureFrame& features) {
@@ -50,7 +52,7 @@ class MiscalibratedMap {
   SyntheticWorld world_;
   PlantedMap planted_;
   CameraCalibration given_;
-  LensRefiner refiner_{6000};  // each keyframe turns by little
+  LensRefiner refiner_{kNumLandmarks};  // each keyframe turns by little
   int64_t next_ = 0;
   MapDelta delta_;
 };

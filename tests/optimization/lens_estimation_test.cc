@@ -32,7 +32,7 @@ BundleProblem ProblemOf(const SyntheticBundleOptions& options, const LensError& 
 // Of many points, all of them in the image: beside it, a distortion is no small thing.
 BundleProblem InImage(const LensError& error) {
   SyntheticBundleOptions many = Turning();
-  many.num_points *= 6;
+  many.num_points *= 3;
   BundleProblem problem = ProblemOf(many, {});
   const CameraCalibration& camera = problem.calibration;
   std::erase_if(problem.observations, [&](const BundleObservation& observation) {
