@@ -31,8 +31,7 @@ OccupancySession::OccupancySession(const OccupancySessionOptions& options)
 
 void OccupancySession::Receive(const CameraFrame& frame) {
   if (frame.sensor == SensorType::kMono || images_.contains(frame.id)) return;
-  const bool may_be_keyframe =
-      frame.id > last_decided_ || announced_.contains(frame.id) || keyframe_at_.contains(frame.id);
+  const bool may_be_keyframe = frame.id > last_decided_ || announced_.contains(frame.id) || sent_.contains(frame.id);
   if (!may_be_keyframe || HasScan(frame.id)) return;
   WaitingImage<CameraFrame> waiting{frame, std::nullopt};
   if (image_bytes_ + BytesOf(frame) > options_.max_image_bytes && !SpillToDisk(waiting)) return;
@@ -42,8 +41,8 @@ void OccupancySession::Receive(const CameraFrame& frame) {
 
 // A camera that was started again sends frames again, whose color is used up.
 bool OccupancySession::HasScan(FrameId frame) const {
-  const auto keyframe = keyframe_at_.find(frame);
-  return keyframe != keyframe_at_.end() && scans_.contains(keyframe->second);
+  const auto keyframe = sent_.find(frame);
+  return keyframe != sent_.end() && scans_.contains(keyframe->second.id);
 }
 
 template <class Images>
@@ -82,17 +81,17 @@ void OccupancySession::ColorKeypoints(FrameId frame) {
   const auto keypoints = uncolored_.find(frame);
   if (keypoints == uncolored_.end() || !colors_.contains(frame)) return;
   std::vector<Rgb> colors = ColorsAt(keypoints->second, TakeColor(frame));
-  if (!colors.empty()) keypoint_colors_[keyframe_at_.at(frame)] = std::move(colors);
+  if (!colors.empty()) keypoint_colors_[sent_.at(frame).id] = std::move(colors);
   uncolored_.erase(keypoints);
   has_map_changed_ = true;
 }
 
 void OccupancySession::Receive(const PoseEstimate& pose) {
-  if (pose.is_keyframe && !keyframe_at_.contains(pose.frame)) announced_.insert(pose.frame);
+  if (pose.is_keyframe && !sent_.contains(pose.frame)) announced_.insert(pose.frame);
   last_decided_ = std::max(last_decided_, pose.frame);
   for (auto it = images_.begin(); it != images_.end() && it->first <= last_decided_;) {
     auto& [frame, waiting] = *it;
-    if (!announced_.contains(frame) && !keyframe_at_.contains(frame)) {
+    if (!announced_.contains(frame) && !sent_.contains(frame)) {
       Forget(waiting);
       it = images_.erase(it);
       continue;
@@ -106,8 +105,7 @@ void OccupancySession::Receive(const PoseEstimate& pose) {
 Result<> OccupancySession::Receive(const KeyframeObservation& keyframe) {
   const FrameId frame = keyframe.features.frame;
   announced_.erase(frame);
-  keyframe_at_[frame] = keyframe.id;
-  right_shift_at_[frame] = keyframe.features.calibration.right_shift;
+  sent_[frame] = {keyframe.id, keyframe.features.calibration.right_shift};
   camera_ = keyframe.features.calibration;
   if (!occupancy_) {
     const OccupancyOptions fitted = FitToSensor(options_.map, *camera_);
@@ -150,7 +148,7 @@ bool OccupancySession::Advance() {
 
 bool OccupancySession::is_done() const {
   const bool has_all = announced_.empty() && num_without_scan() == 0 && uncolored_.empty() &&
-                       static_cast<int64_t>(keyframe_at_.size()) >= num_expected_;
+                       static_cast<int64_t>(sent_.size()) >= num_expected_;
   return has_map_ended_ && (has_all || has_given_up_) && !has_map_changed_ && plan_.empty() && !FindImage();
 }
 
@@ -162,14 +160,14 @@ std::vector<Rigid3> OccupancySession::Path() const {
 }
 
 int64_t OccupancySession::num_without_scan() const {
-  return IsMono() ? 0 : static_cast<int64_t>(keyframe_at_.size() - scans_.size());
+  return IsMono() ? 0 : static_cast<int64_t>(sent_.size() - scans_.size());
 }
 
 // The first frame whose images are there and that is a keyframe.
 std::optional<FrameId> OccupancySession::FindImage() const {
   for (const auto& [id, frame] : images_) {
     const bool has_color = !options_.with_color || has_given_up_ || colors_.contains(id);
-    if (has_color && keyframe_at_.contains(id)) return id;
+    if (has_color && sent_.contains(id)) return id;
   }
   return std::nullopt;
 }
@@ -185,8 +183,9 @@ bool OccupancySession::MakeScan() {
   if (!images || !HasImages(*images, *camera_)) return true;
   if (color.width != camera_->width_px || color.height != camera_->height_px) color = {};
   CameraCalibration camera = *camera_;
-  camera.right_shift = right_shift_at_.at(*id);
-  scans_[keyframe_at_.at(*id)] = std::make_shared<const Scan>(
+  const SentKeyframe& keyframe = sent_.at(*id);
+  camera.right_shift = keyframe.right_shift;
+  scans_[keyframe.id] = std::make_shared<const Scan>(
       ScanFromImages(*images, color, camera, occupancy_->options(), options_.max_disparity_px));
   has_map_changed_ = true;
   return true;
@@ -199,7 +198,8 @@ void OccupancySession::Plan() {
   targets_.clear();
   const std::set<KeyframeId> main_part = MainPart();
   std::vector<KeyframeId> gone, added, moved;
-  for (const auto& [frame, id] : keyframe_at_) {
+  for (const auto& [frame, keyframe] : sent_) {
+    const KeyframeId id = keyframe.id;
     const OccupancyMap::Placed* placed = occupancy_->Find(id);
     const std::optional<Rigid3> target = TargetOf(id, main_part);
     if (target) targets_.emplace(id, *target);

@@ -76,6 +76,11 @@ class OccupancySession {
   int64_t num_waiting() const { return static_cast<int64_t>(plan_.size() + images_.size()); }
 
  private:
+  struct SentKeyframe {
+    KeyframeId id;
+    RightShift right_shift;  // by which its columns had been moved
+  };
+
   template <class Images>
   bool SpillToDisk(WaitingImage<Images>& waiting);
   template <class Images>
@@ -102,11 +107,10 @@ class OccupancySession {
   FrameId last_decided_;  // POSE has told of the frames up to this one whether they are keyframes
   // Of keyframes, and of frames that may become one.
   std::map<FrameId, WaitingImage<CameraFrame>> images_;
-  int64_t image_bytes_ = 0;                       // in memory
-  std::unique_ptr<ScratchFile> scratch_;          // null: there is none
-  std::map<FrameId, KeyframeId> keyframe_at_;     // that the tracker sent
-  std::map<FrameId, RightShift> right_shift_at_;  // by which its columns had been moved
-  std::set<FrameId> announced_;                   // by POSE, and not yet sent
+  int64_t image_bytes_ = 0;               // in memory
+  std::unique_ptr<ScratchFile> scratch_;  // null: there is none
+  std::map<FrameId, SentKeyframe> sent_;  // by the tracker
+  std::set<FrameId> announced_;           // by POSE, and not yet sent
   // That came; empty from when they are used.
   std::map<FrameId, WaitingImage<ColorImage>> colors_;
   // Mono: keypoints of keyframes whose colors did not come yet, and the colors of keypoints.
