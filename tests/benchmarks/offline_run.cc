@@ -62,6 +62,23 @@ void Renumber(FeatureSequence& sequence) {
   for (GroundTruthPose& pose : sequence.ground_truth) pose.frame = number_of.at(pose.frame);
 }
 
+// Which images lack, by Variation::gaps. None of the first twenty: a run needs a start.
+class Gaps {
+ public:
+  explicit Gaps(int64_t seed) : has_any_(seed != 0), random_(static_cast<uint64_t>(seed)) {}
+
+  bool Contains(int64_t image) {
+    if (!has_any_ || image < 20) return false;
+    if (num_left_ == 0) num_left_ = random_() % 20 == 0 ? 3 + static_cast<int64_t>(random_() % 7) : 1;
+    return --num_left_ > 0;
+  }
+
+ private:
+  bool has_any_;
+  std::mt19937_64 random_;
+  int64_t num_left_ = 0;  // of the present gap, with the image that ends it
+};
+
 // The last frame comes first, at the time of the first.
 void ReverseTime(FeatureSequence& sequence) {
   if (sequence.frames.empty()) return;
@@ -87,8 +104,9 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
     for (GroundTruthPose& pose : sequence.ground_truth) pose.world_from_camera = Mirrored(pose.world_from_camera);
   }
   Extractor extractor;
+  Gaps gaps(variation.gaps);
   for (int64_t i = 0; auto frame = source->Next(); ++i) {
-    if (i % variation.step != 0) continue;
+    if (i % variation.step != 0 || gaps.Contains(i)) continue;
     if (variation.is_mirrored) MirrorImage(frame->left);
     int64_t& num_corners = sequence.num_corners.emplace_back();
     sequence.frames.push_back(Measure(sequence.extract_ms, [&] {
@@ -96,7 +114,7 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
     }));
   }
   if (variation.is_reversed) ReverseTime(sequence);
-  if (variation.is_reversed || variation.step > 1) Renumber(sequence);
+  if (variation.is_reversed || variation.step > 1 || variation.gaps != 0) Renumber(sequence);
   return sequence;
 }
 

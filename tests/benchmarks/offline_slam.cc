@@ -2,7 +2,7 @@
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0]
-//   [reverse=0] [step=1] [min_focal=0] [vocabulary=FILE]
+//   [reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
 // With several delays, the sequence is played once with each; the spread tells what chance alone does to the errors.
@@ -70,6 +70,8 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.variation.is_reversed = value != 0;
     else if (key == "step")
       arguments.variation.step = value;
+    else if (key == "gaps")
+      arguments.variation.gaps = value;
     else
       throw InputError("unknown argument `" + key + "`");
   }
@@ -226,7 +228,7 @@ int main(int argc, char** argv) {
   if (argc < 4) {
     std::cerr
         << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] "
-           "[reverse=0] [step=1] [min_focal=0] [vocabulary=FILE]\n";
+           "[reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]\n";
     return 2;
   }
   try {
