@@ -35,8 +35,8 @@ void AddBody(const CameraCalibration& camera, double share, double reach_m, uint
     const double left = side + random.Uniform(-0.1, 0.1);
     const double near = random.Uniform(0.3, 0.7);
     const double width = random.Uniform(0.12, 0.3);
-    lay(left, left + width, near, near + random.Uniform(0.1, 0.25), 0.004 * reach_m,
-        kThings[static_cast<size_t>(random.Index(static_cast<int>(kThings.size())))]);
+    const Material thing = kThings[static_cast<size_t>(random.Index(static_cast<int>(kThings.size())))];
+    lay(left, left + width, near, near + random.Uniform(0.1, 0.25), 0.004 * reach_m, thing);
   }
   // What stands on it: a mascot, a bumper bar or a gripper.
   for (const double side : {random.Uniform(-0.4, -0.1), random.Uniform(0.2, 0.5)}) {

@@ -74,7 +74,8 @@ class CountryBuilder {
   void PlantForest(const Stretch& stretch) {
     for (double along = stretch.from_m; along < stretch.to_m; along += random_.Uniform(2.0, 4.5)) {
       for (const double side : {1.0, -1.0}) {
-        const double right = 6.5 + 30.0 * random_.Uniform(0.0, 1.0) * random_.Uniform(0.0, 1.0);
+        const double reach_m = 30.0 * random_.Uniform(0.0, 1.0);
+        const double right = 6.5 + reach_m * random_.Uniform(0.0, 1.0);
         const auto kind = static_cast<size_t>(random_.Index(kNumTreeKinds));
         Plant(trees_[kind], line_.Beside(along, side * right));
       }

@@ -121,7 +121,8 @@ class HighwayBuilder {
 
   void PlantTrees(double from_m, double to_m, double side, double spacing_m) {
     for (double along = from_m; along < to_m; along += random_.Uniform(0.4, 1.6) * spacing_m) {
-      const double right = 17.5 + 30.0 * random_.Uniform(0.0, 1.0) * random_.Uniform(0.0, 1.0);
+      const double reach_m = 30.0 * random_.Uniform(0.0, 1.0);
+      const double right = 17.5 + reach_m * random_.Uniform(0.0, 1.0);
       const TreeKind& kind = trees_[static_cast<size_t>(random_.Index(kNumTreeKinds))];
       PlantTree(kind, line_.Beside(along, side * right), -0.1, builder_);
     }

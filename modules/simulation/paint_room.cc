@@ -109,7 +109,8 @@ Texture PaintPaper(const PaintSpec& spec) {
   for (double y = h - 0.03; y > 0.3 * h; y -= random.Chance(0.2) ? 0.02 : 0.009) {
     canvas.Scribble({0.015, y, random.Uniform(0.4, 1.0) * (w - 0.03), 0.006}, 0.005, 70.0);
   }
-  canvas.Fill({0.1 * w, 0.05 * h, random.Uniform(0.3, 0.8) * w, 0.2 * h}, random.Uniform(60.0, 180.0), {6.0, 25.0});
+  const double tone = random.Uniform(60.0, 180.0);
+  canvas.Fill({0.1 * w, 0.05 * h, random.Uniform(0.3, 0.8) * w, 0.2 * h}, tone, {6.0, 25.0});
   return MakeTexture(std::move(canvas.image()), {});
 }
 
@@ -123,7 +124,8 @@ Texture PaintPackage(const PaintSpec& spec) {
     const double x = random.Uniform(0.0, 0.6) * w;
     const double y = random.Uniform(0.0, 0.7) * h;
     const double width = random.Uniform(0.2, 0.4) * w;
-    canvas.Fill({x, y, width, random.Uniform(0.1, 0.3) * h}, random.Uniform(45.0, 220.0), {3.0, 8.0});
+    const double label_tone = random.Uniform(45.0, 220.0);
+    canvas.Fill({x, y, width, random.Uniform(0.1, 0.3) * h}, label_tone, {3.0, 8.0});
   }
   canvas.Scribble({0.15 * w, random.Uniform(0.3, 0.6) * h, 0.7 * w, 0.25 * h}, 0.012, tone > 130.0 ? 45.0 : 210.0);
   return MakeTexture(std::move(canvas.image()), {});
