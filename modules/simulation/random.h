@@ -30,8 +30,8 @@ inline float NormalOf(uint32_t hash) {
   return static_cast<float>(sum - 510) * (1.0F / 147.8F);
 }
 
-// A sequence of random numbers. Draw at most one in the arguments of a call: C++ leaves their order open (in braces it
-// is from left to right).
+// A sequence of random numbers. Draw at most one in an expression: C++ leaves open in which order arguments and
+// operands are evaluated (in braces it is from left to right).
 class Random {
  public:
   explicit Random(uint32_t seed) : seed_(seed) {}

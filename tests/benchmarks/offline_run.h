@@ -29,7 +29,7 @@ struct Variation {
   bool is_mirrored = false;  // mono only: left and right are swapped, in images and truth
   bool is_reversed = false;  // the last image comes first, as long before the next as it came after it
   int64_t step = 1;          // only each step-th image
-  int64_t gaps = 0;          // seed of where images lack, as when a bus is busy: a fifth, 2 to 8 in a row; 0: none
+  int64_t gaps = 0;          // seed of where images lack, as when USB is busy: a fifth, 2 to 8 in a row; 0: none
 };
 
 // Reads and extracts. Throws InputError as OpenSource does, or if there can be no such variation.

@@ -3,13 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
 
 #include "support/synthetic_world.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kNumLandmarks = 4000;
+constexpr size_t kNumLandmarks = 4000;
 
 // A map of a camera whose calibration gives focal lengths that are wrong by `error`.
 class MiscalibratedMap {
