@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -52,6 +53,9 @@ struct CameraCalibration {
   bool operator==(const CameraCalibration&) const = default;
 
   Result<> Check() const;
+
+  // What sizes in the image are shares of, where it must not matter how the camera stands.
+  int longer_side_px() const { return std::max(width_px, height_px); }
 
   // Pixel of a point in the camera frame; its z must be > 0.
   Eigen::Vector2d Project(const Eigen::Vector3d& point_in_camera) const {

@@ -1,11 +1,10 @@
 #include "matching/point_matching.h"
 
 #include <algorithm>
-#include <map>
-#include <set>
 #include <utility>
 
 #include "core/quantile.h"
+#include "measurement/image_cells.h"
 
 namespace tessera {
 namespace {
@@ -152,27 +151,26 @@ int NumExpected(const KnownPoints& points, const TrackedFrame& frame) {
 }
 
 double Coverage(const KnownPoints& points, const TrackedFrame& frame) {
-  constexpr int kCellsAcross = 16, kMinExpected = 3;
+  constexpr int kCellsAlong = 16, kMinExpected = 3;
   const CameraCalibration& camera = frame.view->calibration();
-  const double cell_px = static_cast<double>(camera.width_px) / kCellsAcross;
-  const auto cell_of = [&](const Eigen::Vector2d& pixel_px) {
-    return kCellsAcross * static_cast<int>(pixel_px.y() / cell_px) + static_cast<int>(pixel_px.x() / cell_px);
-  };
-  std::map<int, int> num_expected;
+  const ImageCells cells(camera, kCellsAlong);
+  std::vector<int> num_expected(Index(cells.num()), 0);
   const View view(camera, frame.world_from_camera);
   for (const auto& [id, landmark] : points) {
-    if (const std::optional<ExpectedView> expected = Expect(view, landmark))
-      ++num_expected[cell_of(expected->pixel_px)];
+    const std::optional<ExpectedView> expected = Expect(view, landmark);
+    if (expected) ++num_expected[Index(cells.Of(expected->pixel_px.x(), expected->pixel_px.y()))];
   }
-  std::set<int> shown;
+  std::vector<char> is_shown(num_expected.size(), 0);
   for (size_t i = 0; i < frame.points.size(); ++i) {
-    if (frame.points[i].valid()) shown.insert(cell_of(frame.view->observation(static_cast<int>(i)).pixel_px));
+    if (!frame.points[i].valid()) continue;
+    const Eigen::Vector2d pixel_px = frame.view->observation(static_cast<int>(i)).pixel_px;
+    is_shown[Index(cells.Of(pixel_px.x(), pixel_px.y()))] = 1;
   }
   int num_cells = 0, num_shown = 0;
-  for (const auto& [cell, num] : num_expected) {
-    if (num < kMinExpected) continue;
+  for (size_t cell = 0; cell < num_expected.size(); ++cell) {
+    if (num_expected[cell] < kMinExpected) continue;
     ++num_cells;
-    num_shown += shown.contains(cell) ? 1 : 0;
+    num_shown += is_shown[cell];
   }
   return num_cells > 0 ? static_cast<double>(num_shown) / num_cells : 0.0;
 }

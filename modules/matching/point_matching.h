@@ -59,7 +59,7 @@ int MatchAnywhere(const KnownPoints& points, const MatchOptions& options, Tracke
 // How many of the points the frame should see, at its pose.
 int NumExpected(const KnownPoints& points, const TrackedFrame& frame);
 
-// The share of image cells with a match (1/16 of the width each), of those cells in which the frame, at its pose,
+// The share of image cells with a match (1/16 of the longer side each), of those cells in which the frame, at its pose,
 // should see several of the points. An object found in two places, such as a parked car of the same make, agrees with a
 // pose as well as a place does; but what is around the object is not seen then.
 double Coverage(const KnownPoints& points, const TrackedFrame& frame);

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 #include <tuple>
 #include <utility>
 
 #include "core/quantile.h"
 #include "geometry/absolute_pose.h"
 #include "matching/frame_pose.h"
+#include "measurement/image_cells.h"
 #include "tracking/confirmed_points.h"
 #include "tracking/local_points.h"
 #include "tracking/pair_motion.h"
@@ -32,7 +32,7 @@ constexpr double kMaxDirectionSigma_rad = 0.1, kMaxVehicleSigma_px = 5.0;
 constexpr double kMinShareOfConfirmed = 0.3;
 
 // Before a motion is known: how many poses on which points agree are tried, and pieces of the image in a row.
-constexpr int kMaxMotions = 3, kCellColumns = 20;
+constexpr int kMaxMotions = 3, kCellsAlong = 20;
 
 // What makes the camera jump must have more than three times the points of what lets it go on, and more of the
 // confirmed ones, where so many tell. What moves by less in the image goes on.
@@ -47,16 +47,16 @@ constexpr int kFewWithDepth = 100;
 // What the essential matrix of two frames may be off by, and a wall seen one window too far is not.
 constexpr double kMaxTurnFromPair_rad = 0.035;
 
-// How many square pieces of the image hold points of the frame.
+// How many pieces of the image hold points of the frame.
 int NumCells(const TrackedFrame& frame) {
-  const double cell_px = static_cast<double>(frame.view->calibration().width_px) / kCellColumns;
-  std::set<std::pair<int, int>> cells;
+  const ImageCells cells(frame.view->calibration(), kCellsAlong);
+  std::vector<char> is_held(Index(cells.num()), 0);
   for (size_t i = 0; i < frame.points.size(); ++i) {
     if (!frame.points[i].valid()) continue;
     const Keypoint& keypoint = frame.view->features().keypoints[i];
-    cells.emplace(static_cast<int>(keypoint.y_px / cell_px), static_cast<int>(keypoint.x_px / cell_px));
+    is_held[Index(cells.Of(keypoint.x_px, keypoint.y_px))] = 1;
   }
-  return static_cast<int>(cells.size());
+  return static_cast<int>(std::ranges::count(is_held, 1));
 }
 
 double TurnBetween(const Rigid3& a, const Rigid3& b) { return LogSO3(a.rotation.conjugate() * b.rotation).norm(); }

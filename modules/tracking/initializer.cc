@@ -36,7 +36,7 @@ std::optional<MonoStart> MonoInitializer::Add(const std::shared_ptr<const FrameV
     SetReference(frame);
     return std::nullopt;
   }
-  const double radius_px = options_.radius_share * frame->calibration().width_px;
+  const double radius_px = options_.radius_share * frame->calibration().longer_side_px();
   const std::vector<Match> matches = MatchInWindow(*reference_, last_seen_px_, *frame, radius_px, options_.matching);
   if (static_cast<int>(matches.size()) < options_.min_matches) {
     SetReference(frame);

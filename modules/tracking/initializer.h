@@ -16,7 +16,7 @@
 namespace tessera {
 
 struct InitializerOptions {
-  double radius_share = 0.1;  // search window: +- this share of the image's width around the position in the last frame
+  double radius_share = 0.1;  // search window: +- this share of the longer side around the position in the last frame
   int min_matches = 100;      // with fewer, the newest frame becomes the reference
   int max_frames = 40;        // of the reference; an older one is replaced likewise
   MatchingOptions matching{50, 0.9, true};

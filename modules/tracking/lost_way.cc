@@ -74,7 +74,7 @@ std::optional<Eigen::Quaterniond> LostWay::TurnTo(const FrameView& view, const E
   }
   std::vector<PixelPair> pairs;
   for (const Match& match :
-       MatchInWindow(*anchor_, centers_px, view, options_.radius_share * camera.width_px, options_.matching)) {
+       MatchInWindow(*anchor_, centers_px, view, options_.radius_share * camera.longer_side_px(), options_.matching)) {
     pairs.push_back({anchor_->pixel(match.first), view.pixel(match.second)});
   }
   if (2 * NumFar(camera, pairs, Eigen::Quaterniond::Identity()) > pairs.size()) return Eigen::Quaterniond::Identity();

@@ -16,7 +16,7 @@ namespace tessera {
 
 struct LostWayOptions {
   MatchingOptions matching{50, 0.9, true};
-  double radius_share = 0.15;  // search window: +- this share of the image's width around where the turn leads
+  double radius_share = 0.15;  // search window: +- this share of the image's longer side around where the turn leads
   TwoViewOptions two_view{.min_points = 20, .min_parallax_rad = 0.002};
   // Of the camera's way in its axes, an axis: from image to image, turning is hardly told from moving aside.
   double direction_sigma_rad = 0.01;

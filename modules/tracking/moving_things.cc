@@ -16,9 +16,9 @@
 namespace tessera {
 namespace {
 
-constexpr int kColumns = 40;                 // pieces of the image in a row
-constexpr double kWindowShare = 0.035;       // of the width: a mark is looked for so far from where it is expected
-constexpr int64_t kMaxAge_us = 300'000;      // of marks
+constexpr int kCellsAlong = 40;          // the image
+constexpr double kWindowShare = 0.035;   // of the longer side: a mark is looked for so far from where it is expected
+constexpr int64_t kMaxAge_us = 300'000;  // of marks
 constexpr int64_t kTellingAge_us = 120'000;  // what agrees with the scene's motion for so long stands still
 constexpr int kMinSeen = 40, kFewSeen = 60;  // marks: fewer tell nothing; new ones are due
 constexpr double kMinShareSeen = 0.5;        // of the most that a frame showed of these marks
@@ -91,27 +91,21 @@ FeatureFrame MovingThings::Without(FeatureFrame features) const {
 
 bool MovingThings::any_goes() const { return num_going_ >= kMinGroup; }
 
-int MovingThings::CellOf(double x_px, double y_px) const {
-  const auto at = [this](double px, int num) { return static_cast<int>(std::clamp(px / cell_px_, 0.0, num - 1.0)); };
-  return kColumns * at(y_px, num_rows_) + at(x_px, kColumns);
-}
-
 void MovingThings::Restart(const CameraCalibration& camera) {
   *this = {};
   camera_ = camera;
-  cell_px_ = std::max(1.0, static_cast<double>(camera.width_px) / kColumns);
-  num_rows_ = std::max(1, static_cast<int>(std::ceil(camera.height_px / cell_px_)));
+  grid_ = ImageCells(camera, kCellsAlong);
 }
 
 // The strongest keypoint with depth of each piece of the image. What was on something that moves is so until it shows
 // that it stands still.
 void MovingThings::SetMarks(const FeatureFrame& features) {
-  std::vector<int32_t> strongest(Index(kColumns * num_rows_), -1);
+  std::vector<int32_t> strongest(Index(grid_.num()), -1);
   const auto score_of = [&](int32_t i) { return static_cast<int>(features.keypoints[Index(i)].score); };
   for (int32_t i = 0; i < std::ssize(features.keypoints); ++i) {
     if (!SeenAt(features, i).has_right()) continue;
     const Keypoint& keypoint = features.keypoints[Index(i)];
-    int32_t& kept = strongest[Index(CellOf(keypoint.x_px, keypoint.y_px))];
+    int32_t& kept = strongest[Index(grid_.Of(keypoint.x_px, keypoint.y_px))];
     if (kept < 0 || score_of(i) > score_of(kept)) kept = i;
   }
   marks_.clear();
@@ -138,7 +132,7 @@ void MovingThings::SetMarks(const FeatureFrame& features) {
 // the mark that looks most like it.
 void MovingThings::FollowMarks(const FeatureFrame& features, const Rigid3& expected) {
   const FeatureGrid grid(features.keypoints, camera_.width_px, camera_.height_px);
-  const double radius_px = kWindowShare * camera_.width_px;
+  const double radius_px = kWindowShare * camera_.longer_side_px();
   std::vector<Match> matches;
   for (size_t i = 0; i < marks_.size(); ++i) {
     Mark& mark = marks_[i];
@@ -291,12 +285,13 @@ void MovingThings::LabelMarks(const std::vector<PoseObservation>& observations, 
 }
 
 void MovingThings::KeepLabels(const FeatureFrame& features) {
-  labels_.assign(Index(kColumns * num_rows_), {});
+  labels_.assign(Index(grid_.num()), {});
   num_moving_ = num_going_ = 0;
   for (const Mark& mark : marks_) {
     if (mark.keypoint < 0 || (!mark.is_of_scene && !mark.is_moving)) continue;
     const std::optional<Eigen::Vector3d> point = PointFromDepth(features, mark.keypoint);
-    labels_[Index(CellOf(mark.pixel_px.x(), mark.pixel_px.y()))].push_back({point ? point->z() : 0.0, mark.is_moving});
+    labels_[Index(grid_.Of(mark.pixel_px.x(), mark.pixel_px.y()))].push_back(
+        {point ? point->z() : 0.0, mark.is_moving});
     num_moving_ += mark.is_moving ? 1 : 0;
     num_going_ += mark.is_moving && mark.step_px.norm() > kStill_px ? 1 : 0;
   }
@@ -310,17 +305,14 @@ bool MovingThings::Covers(const FeatureFrame& features, int32_t keypoint) const 
   const auto is_beside = [&](const Label& label) {
     return !point || label.depth_m == 0.0 || std::abs(point->z() - label.depth_m) <= kSameDepth * label.depth_m;
   };
-  const int cell = CellOf(pixel_px.x(), pixel_px.y()), row = cell / kColumns, column = cell % kColumns;
   int num = 0, num_moving = 0;
-  for (int r = std::max(0, row - 1); r <= std::min(num_rows_ - 1, row + 1); ++r) {
-    for (int c = std::max(0, column - 1); c <= std::min(kColumns - 1, column + 1); ++c) {
-      for (const Label& label : labels_[Index(r * kColumns + c)]) {
-        if (!is_beside(label)) continue;
-        ++num;
-        num_moving += label.is_moving ? 1 : 0;
-      }
+  grid_.VisitAround(grid_.Of(pixel_px.x(), pixel_px.y()), [&](size_t cell) {
+    for (const Label& label : labels_[cell]) {
+      if (!is_beside(label)) continue;
+      ++num;
+      num_moving += label.is_moving ? 1 : 0;
     }
-  }
+  });
   return 2 * num_moving > num;
 }
 

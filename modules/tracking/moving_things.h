@@ -18,6 +18,7 @@
 #include "features/feature_types.h"
 #include "geometry/pose_optimization.h"
 #include "geometry/rigid3.h"
+#include "measurement/image_cells.h"
 
 namespace tessera {
 
@@ -82,11 +83,8 @@ class MovingThings {
   void KeepLabels(const FeatureFrame& features);
   bool Covers(const FeatureFrame& features, int32_t keypoint) const;
 
-  int CellOf(double x_px, double y_px) const;
-
   CameraCalibration camera_;
-  double cell_px_ = 1.0;
-  int num_rows_ = 0;
+  ImageCells grid_;
   std::vector<Mark> marks_;
   int64_t marked_us_ = 0, last_us_ = 0;  // times of the marked and the last frame
   int most_seen_ = 0;                    // of the marks, in a frame

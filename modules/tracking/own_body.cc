@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kColumns = 40;               // of cells
+constexpr int kCellsAlong = 40;            // the image
 constexpr int kMarksPerCell = 3;           // the strongest
 constexpr int64_t kInterval_us = 90'000;   // at least, between looks
 constexpr int64_t kMaxAge_us = 2'000'000;  // of marks
@@ -47,15 +47,6 @@ bool OwnBody::Scene::Contradicts(double depth_m) const {
   return IsNearerThanMost(depth_m) || (turns && !is_behind_most);
 }
 
-int OwnBody::num_rows() const { return num_cells() / kColumns; }
-
-int OwnBody::CellOf(const Keypoint& keypoint) const {
-  const auto at = [this](float px, int num) {
-    return static_cast<int>(std::clamp(static_cast<double>(px) / cell_px_, 0.0, num - 1.0));
-  };
-  return kColumns * at(keypoint.y_px, num_rows()) + at(keypoint.x_px, kColumns);
-}
-
 void OwnBody::Add(const FeatureFrame& features) {
   if (cells_.empty() || features.calibration != camera_) {
     Restart(features.calibration);
@@ -83,8 +74,8 @@ FeatureFrame OwnBody::Without(FeatureFrame features) const {
 
 void OwnBody::Restart(const CameraCalibration& camera) {
   camera_ = camera;
-  cell_px_ = std::max(1.0, static_cast<double>(camera.width_px) / kColumns);
-  cells_.assign(Index(kColumns * std::max(1, static_cast<int>(std::ceil(camera.height_px / cell_px_)))), {});
+  grid_ = ImageCells(camera, kCellsAlong);
+  cells_.assign(Index(grid_.num()), {});
   num_body_ = 0;
 }
 
@@ -173,31 +164,20 @@ void OwnBody::Count(const std::vector<CellMarks>& marks, const Scene& scene) {
   for (const size_t i : nearest) cells_[i].score = std::min(cells_[i].score + kBodyScore, kMaxScore);
 }
 
-// Of a cell and those around it.
-template <class Visit>
-void OwnBody::VisitAround(int cell, Visit visit) const {
-  const int row = cell / kColumns, column = cell % kColumns;
-  for (int r = std::max(0, row - 1); r <= std::min(num_rows() - 1, row + 1); ++r) {
-    for (int c = std::max(0, column - 1); c <= std::min(kColumns - 1, column + 1); ++c) {
-      visit(Index(r * kColumns + c));
-    }
-  }
-}
-
 // Cells that stand still in groups of three; fewer than kMinCells in all are there by chance. Where no keypoint has
 // been so far, it is as around.
 void OwnBody::FindBody() {
   std::vector<uint8_t> is_still(cells_.size()), is_inside(cells_.size()), is_body(cells_.size());
   for (size_t i = 0; i < cells_.size(); ++i) is_still[i] = cells_[i].score >= kBodyScore ? 1 : 0;
-  for (int i = 0; i < num_cells(); ++i) {
+  for (int i = 0; i < grid_.num(); ++i) {
     int num = 0;
-    VisitAround(i, [&](size_t neighbor) { num += is_still[neighbor]; });
+    grid_.VisitAround(i, [&](size_t neighbor) { num += is_still[neighbor]; });
     const bool may_be = is_still[Index(i)] != 0 || cells_[Index(i)].score == 0;
     is_inside[Index(i)] = may_be && num >= 3 ? 1 : 0;
   }
-  for (int i = 0; i < num_cells(); ++i) {
+  for (int i = 0; i < grid_.num(); ++i) {
     bool is_beside = false;
-    VisitAround(i, [&](size_t neighbor) { is_beside |= is_inside[neighbor] != 0; });
+    grid_.VisitAround(i, [&](size_t neighbor) { is_beside |= is_inside[neighbor] != 0; });
     is_body[Index(i)] = is_inside[Index(i)] != 0 || (is_still[Index(i)] != 0 && is_beside) ? 1 : 0;
   }
   num_body_ = static_cast<int>(std::ranges::count(is_body, 1));

@@ -16,6 +16,7 @@
 
 #include "features/feature_types.h"
 #include "map/map.h"
+#include "measurement/image_cells.h"
 
 namespace tessera {
 
@@ -29,7 +30,7 @@ class OwnBody {
   // In pixels as the source gives them.
   bool Covers(const Keypoint& keypoint) const { return !cells_.empty() && cells_[Index(CellOf(keypoint))].is_body; }
   // Of the image.
-  double share() const { return cells_.empty() ? 0.0 : static_cast<double>(num_body_) / num_cells(); }
+  double share() const { return cells_.empty() ? 0.0 : static_cast<double>(num_body_) / grid_.num(); }
   // How many pieces of the image have ever been taken for the body.
   int num_found() const { return num_found_; }
 
@@ -65,21 +66,17 @@ class OwnBody {
     bool IsNearerThanMost(double depth_m) const;
   };
 
-  int num_cells() const { return static_cast<int>(cells_.size()); }
-  int num_rows() const;
-  int CellOf(const Keypoint& keypoint) const;
+  int CellOf(const Keypoint& keypoint) const { return grid_.Of(keypoint.x_px, keypoint.y_px); }
   void Restart(const CameraCalibration& camera);
   void SetMarks(const FeatureFrame& features);
   std::vector<CellMarks> LookForMarks(const FeatureFrame& features) const;
   Scene Judge(const std::vector<CellMarks>& marks) const;
   void Count(const std::vector<CellMarks>& marks, const Scene& scene);
   void FindBody();
-  template <class Visit>
-  void VisitAround(int cell, Visit visit) const;
 
   CameraCalibration camera_;
-  double cell_px_ = 1.0;
-  std::vector<Cell> cells_;  // row by row
+  ImageCells grid_;
+  std::vector<Cell> cells_;
   std::vector<Mark> marks_;  // keypoints of one frame, a few of each cell
   int64_t marked_us_ = 0;    // when it was taken
   int64_t looked_us_ = 0;    // when they were looked for last
