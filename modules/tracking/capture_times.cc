@@ -68,7 +68,7 @@ std::optional<CameraMotion> CaptureTimes::MotionAtEnd(const std::optional<Step>&
 
 CaptureTimes::Frame CaptureTimes::Moved(const CapturedFrame& captured, const TrackedFrame& last,
                                         const TrackedFrame& tracked, const std::optional<CameraMotion>& motion) const {
-  const bool is_rolling = readout_s() > 0.0, is_late = captured.depth_delay_s != 0.0;
+  const bool is_rolling = readout().is_rolling(), is_late = captured.depth_delay_s != 0.0;
   if (!motion || (!is_rolling && !is_late)) return captured.view;
   FeatureFrame features = is_late
                               ? WithDepthsOfImage(*captured.view, captured.surfaces, captured.depth_delay_s, *motion)
@@ -89,7 +89,7 @@ FeatureFrame CaptureTimes::Unrolled(const FeatureFrame& rolled, const TrackedFra
       depths[i] = measured_m;
     }
   }
-  return Unroll(rolled, depths, readout_s(), motion);
+  return Unroll(rolled, depths, readout(), motion);
 }
 
 }  // namespace tessera

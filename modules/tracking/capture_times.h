@@ -50,7 +50,7 @@ class CaptureTimes {
   void ForgetMotion();
 
   // What was learned of the camera: see ReadoutEstimator, DepthDelayEstimator.
-  double readout_s() const { return readout_.readout_s(); }
+  Readout readout() const { return readout_.readout(); }
   double depth_delay_s() const { return depth_delay_.delay_s(); }
 
  private:

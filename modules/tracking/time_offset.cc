@@ -13,6 +13,7 @@ constexpr double kFrameSigma_s = 0.01;
 // However many frames have been seen: what the first ones said, with a map that was distorted, is forgotten.
 constexpr double kMinSigma_s = 0.001;
 constexpr double kMinSigmas = 4.0;
+constexpr double kMemory = 0.99;  // of ExplainedShare, from frame to frame
 
 }  // namespace
 
@@ -35,7 +36,7 @@ std::optional<TimeOffsetEquations::Error> TimeOffsetEquations::Solve() const {
   const double seconds = (offset_gradient_ - elimination.dot(gradient_)) / information;
   if (!(information > 0.0) || !std::isfinite(seconds)) return std::nullopt;
   const double noise = sum_of_squares_ / num_measured_;
-  return Error{seconds, noise / information};
+  return Error{seconds, noise / information, num_measured_};
 }
 
 void TimeOffset::Add(const TimeOffsetEquations& equations, double used_s) {
@@ -45,6 +46,15 @@ void TimeOffset::Add(const TimeOffsetEquations& equations, double used_s) {
   const double change_s = used_s + error->seconds - estimate_s_;
   estimate_s_ += gain * std::clamp(change_s, -kFrameSigma_s, kFrameSigma_s);
   variance_ = std::max((1.0 - gain) * variance_, kMinSigma_s * kMinSigma_s);
+  const double weight = 1.0 / error->variance;
+  weighted_sum_ = kMemory * weighted_sum_ + weight * (used_s + error->seconds);
+  sum_of_weights_ = kMemory * sum_of_weights_ + weight;
+  sum_measured_ = kMemory * sum_measured_ + error->num_measured;
+  ++num_frames_;
+}
+
+double TimeOffset::ExplainedShare() const {
+  return num_frames_ > 0 ? weighted_sum_ * weighted_sum_ / (sum_of_weights_ * sum_measured_) : 0.0;
 }
 
 double TimeOffset::value_s(double min_s) const {

@@ -19,6 +19,7 @@ class TimeOffsetEquations {
   struct Error {
     double seconds = 0.0;
     double variance = 0.0;  // s^2
+    int num_measured = 0;
   };
 
   // One point: r, J, g above, divided by their standard deviations. `num_measured`: 3 with a depth, else 2.
@@ -47,12 +48,23 @@ class TimeOffset {
   void Add(const TimeOffsetEquations& equations, double used_s);
   // 0 until it is known, to four standard deviations, that it isn't, and while it is shorter than min_s.
   double value_s(double min_s) const;
+  // The share of the squares of the residuals of the last seconds that one such time explains, if nothing had been
+  // taken out. With d(k), variance s(k) and the number n(k) of measurements of the frames:
+  //
+  //   (sum of d / s)^2 / (sum of 1 / s) / (sum of n)
+  //
+  // What else is wrong with poses and map may look like a time, but explains little.
+  double ExplainedShare() const;
+  int num_frames() const { return num_frames_; }
 
  private:
   static constexpr double kInitialSigma_s = 0.01;
 
   double estimate_s_ = 0.0;
   double variance_ = kInitialSigma_s * kInitialSigma_s;
+  // Of ExplainedShare(), the latest frames counting most.
+  double weighted_sum_ = 0.0, sum_of_weights_ = 0.0, sum_measured_ = 0.0;
+  int num_frames_ = 0;
 };
 
 }  // namespace tessera

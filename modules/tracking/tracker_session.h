@@ -61,7 +61,7 @@ class TrackerSession {
   size_t num_waiting() const { return waiting_.size(); }    // frames
   int64_t num_keyframes() const { return num_keyframes_; }  // sent
   double scale_drift() const { return tracker_.scale_drift(); }
-  double readout_s() const { return tracker_.times().readout_s(); }
+  Readout readout() const { return tracker_.times().readout(); }
   double depth_delay_s() const { return tracker_.times().depth_delay_s(); }
   double own_body_share() const { return tracker_.own_body().share(); }
   // The question that was sent and is not answered yet, to be sent again from time to time: a loop closer that was

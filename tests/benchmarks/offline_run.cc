@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <string>
 #include <utility>
@@ -49,6 +50,30 @@ Rigid3 Mirrored(const Rigid3& pose) {
   const Eigen::Quaterniond& q = pose.rotation;
   const Eigen::Vector3d& t = pose.translation;
   return {Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()), {-t.x(), t.y(), t.z()}};
+}
+
+// A quarter turn clockwise.
+template <class Pixel>
+Image<Pixel> Turned(const Image<Pixel>& image) {
+  Image<Pixel> turned(image.height, image.width);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) turned.row(x)[image.height - 1 - y] = image.row(y)[x];
+  }
+  return turned;
+}
+
+CameraCalibration Turned(CameraCalibration camera) {
+  std::swap(camera.width_px, camera.height_px);
+  std::swap(camera.fx_px, camera.fy_px);
+  std::swap(camera.cx_px, camera.cy_px);
+  camera.cx_px = camera.width_px - 1 - camera.cx_px;
+  return camera;
+}
+
+// What was on the right is below then.
+Rigid3 Turned(const Rigid3& world_from_camera) {
+  return {world_from_camera.rotation * ExpSO3(Eigen::Vector3d(0.0, 0.0, -0.5 * std::numbers::pi)),
+          world_from_camera.translation};
 }
 
 // Numbers the frames from 0 on, in their order. Truth of other frames goes.
@@ -104,11 +129,23 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
     sequence.calibration.cx_px = sequence.calibration.width_px - 1 - sequence.calibration.cx_px;
     for (GroundTruthPose& pose : sequence.ground_truth) pose.world_from_camera = Mirrored(pose.world_from_camera);
   }
+  if (variation.quarter_turns < 0) throw InputError("a camera turns by 0 quarter turns or more");
+  if (variation.quarter_turns > 0 && options.sensor == SensorType::kStereo) {
+    throw InputError("stereo pairs stand side by side, they can't be turned");
+  }
+  for (int64_t turn = 0; turn < variation.quarter_turns; ++turn) {
+    sequence.calibration = Turned(sequence.calibration);
+    for (GroundTruthPose& pose : sequence.ground_truth) pose.world_from_camera = Turned(pose.world_from_camera);
+  }
   Extractor extractor;
   Gaps gaps(variation.gaps);
   for (int64_t i = 0; auto frame = source->Next(); ++i) {
     if (i % variation.step != 0 || gaps.Contains(i)) continue;
     if (variation.is_mirrored) MirrorImage(frame->left);
+    for (int64_t turn = 0; turn < variation.quarter_turns; ++turn) {
+      frame->left = Turned(frame->left);
+      if (options.sensor == SensorType::kRgbd) frame->depth = Turned(frame->depth);
+    }
     int64_t& num_corners = sequence.num_corners.emplace_back();
     sequence.frames.push_back(Measure(sequence.extract_ms, [&] {
       return ExtractFrame(*frame, sequence.calibration, feature_options, extractor, &num_corners);
@@ -210,7 +247,7 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
       return TrackOrAsk(tracker, features, run);
     });
     run.poses.push_back(result.pose);
-    run.readout_s = tracker.times().readout_s();
+    run.readout = tracker.times().readout();
     run.depth_delay_s = tracker.times().depth_delay_s();
     const bool is_lost = result.pose.state == TrackingState::kLost;
     run.num_lost += is_lost ? 1 : 0;

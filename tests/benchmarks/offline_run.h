@@ -10,6 +10,7 @@
 #include "features/feature_types.h"
 #include "loop_closing/loop_closer.h"
 #include "mapping/mapper.h"
+#include "measurement/rolling_shutter.h"
 #include "tracking/map_tracker.h"
 #include "tracking/tracker_time.h"
 
@@ -26,10 +27,11 @@ struct FeatureSequence {
 
 // What makes the same images a sequence of its own.
 struct Variation {
-  bool is_mirrored = false;  // mono only: left and right are swapped, in images and truth
-  bool is_reversed = false;  // the last image comes first, as long before the next as it came after it
-  int64_t step = 1;          // only each step-th image
-  int64_t gaps = 0;          // seed of where images lack, as when USB is busy: a fifth, 2 to 8 in a row; 0: none
+  bool is_mirrored = false;   // mono only: left and right are swapped, in images and truth
+  int64_t quarter_turns = 0;  // clockwise, of the images: a phone upright, a camera upside down; not of a stereo pair
+  bool is_reversed = false;   // the last image comes first, as long before the next as it came after it
+  int64_t step = 1;           // only each step-th image
+  int64_t gaps = 0;           // seed of where images lack, as when USB is busy: a fifth, 2 to 8 in a row; 0: none
 };
 
 // Reads and extracts. Throws InputError as OpenSource does, or if there can be no such variation.
@@ -47,7 +49,8 @@ struct OfflineRun {
   int num_lost = 0;
   int num_failures = 0;                                      // changes from tracked to lost
   int num_relocalized = 0;                                   // frames that a loop closer has placed
-  double readout_s = 0.0, depth_delay_s = 0.0;               // as learned by the end (MapTracker)
+  Readout readout;                                           // as learned by the end (MapTracker)
+  double depth_delay_s = 0.0;                                // likewise
   std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
   // Poses of tracked frames: as known at the time, and after all optimization.

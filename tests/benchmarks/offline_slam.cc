@@ -1,7 +1,7 @@
 // The whole of mapping without the bus: reads a data set, extracts, tracks and maps in one thread, with the deltas
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
-//   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0]
+//   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] [turn=0]
 //   [reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
@@ -68,6 +68,8 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.variation.is_mirrored = value != 0;
     else if (key == "reverse")
       arguments.variation.is_reversed = value != 0;
+    else if (key == "turn")
+      arguments.variation.quarter_turns = value;
     else if (key == "step")
       arguments.variation.step = value;
     else if (key == "gaps")
@@ -173,7 +175,8 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
               map.Sha256Hex().c_str());
   std::printf("RMS error %.4f m, live %.4f m\n", RmsError(optimized, sequence.ground_truth, is_mono).value_or(-1.0),
               RmsError(run.Live(), sequence.ground_truth, is_mono).value_or(-1.0));
-  std::printf("readout %.1f ms, depths %.1f ms later\n", 1e3 * run.readout_s, 1e3 * run.depth_delay_s);
+  std::printf("readout %.1f ms down, %.1f ms across, depths %.1f ms later\n", 1e3 * run.readout.down_s,
+              1e3 * run.readout.across_s, 1e3 * run.depth_delay_s);
   std::printf("lens found: fx %.2f px (0: as calibrated), radial %+.4f, right %+.3f %+.3f %+.3f %+.3f\n",
               map.lens().fx_px, map.lens().radial, map.lens().right_shift.center_px, map.lens().right_shift.across_px,
               map.lens().right_shift.down_px, map.lens().right_shift.bend_px);
@@ -228,7 +231,7 @@ int main(int argc, char** argv) {
   if (argc < 4) {
     std::cerr
         << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] "
-           "[reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]\n";
+           "[turn=0] [reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]\n";
     return 2;
   }
   try {

@@ -15,18 +15,18 @@ CameraCalibration Camera() { return VgaCamera(SensorType::kMono); }
 CameraMotion Turning() { return {Eigen::Vector3d::Zero(), {0.0, 1.0, 0.0}}; }
 
 // Frames of a camera at the world's origin that turns by rates that change from frame to frame. It sees points that are
-// known, its rows are read within `readout_s`, and its keypoints are moved by what the estimator holds true.
+// known, its images take `readout` to be read, and its keypoints are moved by what the estimator holds true.
 class ReadoutEstimatorTest : public ::testing::Test {
  protected:
-  void Show(int num_frames, double readout_s) {
+  void Show(int num_frames, const Readout& readout) {
     for (int i = 0; i < num_frames; ++i) {
       const CameraMotion motion{Eigen::Vector3d::Zero(),
                                 {0.1 * gaussian_(random_), 0.8 * gaussian_(random_), 0.1 * gaussian_(random_)}};
-      estimator_.Add(FrameOf(motion, readout_s), motion, {Rigid3::Identity(), CameraMotion{}});
+      estimator_.Add(FrameOf(motion, readout), motion, {Rigid3::Identity(), CameraMotion{}});
     }
   }
 
-  TrackedFrame FrameOf(const CameraMotion& motion, double readout_s) {
+  TrackedFrame FrameOf(const CameraMotion& motion, const Readout& readout) {
     FeatureFrame features;
     features.calibration = Camera();
     std::vector<SeenPoint> points;
@@ -34,11 +34,11 @@ class ReadoutEstimatorTest : public ::testing::Test {
     for (int i = 0; i < 200; ++i) {
       const Eigen::Vector2d pixel(640.0 * uniform_(random_), 480.0 * uniform_(random_));
       const Eigen::Vector3d point = (1.0 + 3.0 * uniform_(random_)) * Camera().Ray(pixel);
-      const double time_s = readout_s * RowTime(Camera(), pixel.y());
+      const double time_s = ReadTime(readout, Camera(), pixel);
       const Eigen::Vector2d seen = Camera().Project(ExpSO3(-time_s * motion.turn_rate) * point);
       Keypoint keypoint;
-      keypoint.x_px = static_cast<float>(seen.x() + 0.5 * gaussian_(random_));
-      keypoint.y_px = static_cast<float>(seen.y() + 0.5 * gaussian_(random_));
+      keypoint.x_px = static_cast<float>(seen.x() + noise_px_ * gaussian_(random_));
+      keypoint.y_px = static_cast<float>(seen.y() + noise_px_ * gaussian_(random_));
       features.keypoints.push_back(keypoint);
       depths.push_back(point.z());
       SeenPoint seen_point{{LandmarkId{i}, {}, -1}, {}};
@@ -46,11 +46,12 @@ class ReadoutEstimatorTest : public ::testing::Test {
       points.push_back(seen_point);
     }
     features.descriptors.resize(features.keypoints.size());
-    TrackedFrame frame(std::make_shared<const FrameView>(Unroll(features, depths, estimator_.readout_s(), motion)));
+    TrackedFrame frame(std::make_shared<const FrameView>(Unroll(features, depths, estimator_.readout(), motion)));
     frame.points = std::move(points);
     return frame;
   }
 
+  double noise_px_ = 0.5;
   ReadoutEstimator estimator_;
   std::mt19937 random_{7};
   std::normal_distribution<double> gaussian_{0.0, 1.0};
@@ -58,25 +59,57 @@ class ReadoutEstimatorTest : public ::testing::Test {
 };
 
 TEST_F(ReadoutEstimatorTest, FindsTheReadoutOfARollingShutter) {
-  Show(200, 0.025);
-  EXPECT_NEAR(estimator_.readout_s(), 0.025, 0.001);
+  Show(200, {.down_s = 0.025});
+  EXPECT_NEAR(estimator_.readout().down_s, 0.025, 0.001);
+  EXPECT_EQ(estimator_.readout().across_s, 0.0);
+}
+
+TEST_F(ReadoutEstimatorTest, ACameraThatHangsUpsideDownReadsFromTheBottom) {
+  Show(200, {.down_s = -0.025});
+  EXPECT_NEAR(estimator_.readout().down_s, -0.025, 0.001);
+  EXPECT_EQ(estimator_.readout().across_s, 0.0);
+}
+
+TEST_F(ReadoutEstimatorTest, ACameraOnItsSideReadsColumns) {
+  Show(200, {.across_s = 0.025});
+  EXPECT_NEAR(estimator_.readout().across_s, 0.025, 0.001);
+  EXPECT_EQ(estimator_.readout().down_s, 0.0);
+}
+
+TEST_F(ReadoutEstimatorTest, ACameraOnItsOtherSideReadsThemFromTheRight) {
+  Show(200, {.across_s = -0.025});
+  EXPECT_NEAR(estimator_.readout().across_s, -0.025, 0.001);
+  EXPECT_EQ(estimator_.readout().down_s, 0.0);
+}
+
+// As of a camera that turns about the vertical in a map that isn't exact.
+TEST_F(ReadoutEstimatorTest, ColumnsThatExplainLittleOfWhatIsSeenArentReadSo) {
+  noise_px_ = 10.0;
+  Show(400, {.across_s = 0.012});
+  EXPECT_EQ(estimator_.readout(), Readout{});
+}
+
+TEST_F(ReadoutEstimatorTest, HowImagesAreReadStaysAsItWasFound) {
+  Show(200, {.across_s = 0.025});
+  Show(400, {.down_s = 0.025});
+  EXPECT_EQ(estimator_.readout().down_s, 0.0);
 }
 
 TEST_F(ReadoutEstimatorTest, AFewFramesDontTellAReadoutFromNone) {
-  Show(3, 0.025);
-  EXPECT_EQ(estimator_.readout_s(), 0.0);
+  Show(3, {.down_s = 0.025});
+  EXPECT_EQ(estimator_.readout(), Readout{});
 }
 
 TEST_F(ReadoutEstimatorTest, AGlobalShutterHasNone) {
-  Show(200, 0.0);
-  EXPECT_EQ(estimator_.readout_s(), 0.0);
+  Show(200, {});
+  EXPECT_EQ(estimator_.readout(), Readout{});
 }
 
 TEST_F(ReadoutEstimatorTest, FramesOfFewPointsTellNothing) {
-  TrackedFrame frame = FrameOf(Turning(), 0.025);
+  TrackedFrame frame = FrameOf(Turning(), {.down_s = 0.025});
   for (size_t i = 40; i < frame.points.size(); ++i) frame.points[i] = {};
   for (int i = 0; i < 100; ++i) estimator_.Add(frame, Turning(), {});
-  EXPECT_EQ(estimator_.readout_s(), 0.0);
+  EXPECT_EQ(estimator_.readout(), Readout{});
 }
 
 }  // namespace

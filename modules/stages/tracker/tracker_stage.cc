@@ -113,7 +113,9 @@ void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
   for (TrackerAction& action : actions) std::visit(perform, action);
   context_.SetValue("keyframes_sent", static_cast<double>(session_.num_keyframes()));
   context_.SetValue("scale_drift", session_.scale_drift());
-  context_.SetValue("readout_ms", 1e3 * session_.readout_s());
+  const Readout readout = session_.readout();
+  context_.SetValue("readout_ms", 1e3 * readout.down_s);
+  context_.SetValue("readout_across_ms", 1e3 * readout.across_s);
   context_.SetValue("depth_delay_ms", 1e3 * session_.depth_delay_s());
   context_.SetValue("own_body_share", session_.own_body_share());
 }

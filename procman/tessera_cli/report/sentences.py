@@ -121,10 +121,15 @@ def _values(result: Result, stage: str) -> dict[str, float]:
 def _readout(result: Result) -> str:
     """What the tracker learned of when rows and depths are read."""
     values = _values(result, "tracker")
-    readout_ms, delay_ms = values.get("readout_ms") or 0.0, values.get("depth_delay_ms") or 0.0
+    down_ms, across_ms = values.get("readout_ms") or 0.0, values.get("readout_across_ms") or 0.0
+    delay_ms = values.get("depth_delay_ms") or 0.0
     found = []
-    if readout_ms:
-        found.append(f"the camera takes {readout_ms:.0f} ms to read an image (a rolling shutter)")
+    if down_ms or across_ms:
+        if across_ms:
+            way = " from left to right" if across_ms > 0 else " from right to left"
+        else:
+            way = "" if down_ms > 0 else " from the bottom up"
+        found.append(f"the camera takes {abs(down_ms or across_ms):.0f} ms to read an image{way} (a rolling shutter)")
     if delay_ms:
         when = "after" if delay_ms > 0 else "before"
         found.append(f"depths are measured {abs(delay_ms):.0f} ms {when} the time they are said to be of")

@@ -164,14 +164,17 @@ def test_other_focal_lengths_than_the_calibration_s_are_told(tmp_path: Path) -> 
 
 
 def test_a_rolling_shutter_and_late_depths_are_told(tmp_path: Path) -> None:
-    for readout_ms, delay_ms, words in [
-        (22.4, 0.0, "The camera takes 22 ms to read an image (a rolling shutter); keypoints"),
-        (0.0, -11.8, "Depths are measured 12 ms before the time they are said to be of; keypoints"),
-        (22.4, 7.0, "(a rolling shutter) and depths are measured 7 ms after the time"),
-        (0.0, 0.0, ""),
+    for down_ms, across_ms, delay_ms, words in [
+        (22.4, 0.0, 0.0, "The camera takes 22 ms to read an image (a rolling shutter); keypoints"),
+        (-22.4, 0.0, 0.0, "The camera takes 22 ms to read an image from the bottom up (a rolling shutter); keypoints"),
+        (0.0, 20.0, 0.0, "takes 20 ms to read an image from left to right (a rolling shutter); keypoints"),
+        (0.0, -20.0, 0.0, "takes 20 ms to read an image from right to left (a rolling shutter); keypoints"),
+        (0.0, 0.0, -11.8, "Depths are measured 12 ms before the time they are said to be of; keypoints"),
+        (22.4, 0.0, 7.0, "(a rolling shutter) and depths are measured 7 ms after the time"),
+        (0.0, 0.0, 0.0, ""),
     ]:
-        values = {"tracker": {"readout_ms": readout_ms, "depth_delay_ms": delay_ms}}
-        folder = write_run(tmp_path / f"{readout_ms} {delay_ms}", sensor="rgbd", stage_values=values)
+        values = {"tracker": {"readout_ms": down_ms, "readout_across_ms": across_ms, "depth_delay_ms": delay_ms}}
+        folder = write_run(tmp_path / f"{down_ms} {across_ms} {delay_ms}", sensor="rgbd", stage_values=values)
         told = [sentence for sentence in headline(read_run(folder)) if "corrected for it" in sentence]
         assert len(told) == bool(words) and (not told or words in told[0])
 
