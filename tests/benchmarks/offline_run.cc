@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -51,6 +53,48 @@ Rigid3 Mirrored(const Rigid3& pose) {
   const Eigen::Vector3d& t = pose.translation;
   return {Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()), {-t.x(), t.y(), t.z()}};
 }
+
+void Dim(GrayImage& image, int64_t times) {
+  for (uint8_t& pixel : image.pixels) pixel = static_cast<uint8_t>((pixel + times / 2) / times);
+}
+
+// Dark spots out of focus, as drops or mud on the lens, where they stay.
+class Dirt {
+ public:
+  explicit Dirt(int64_t seed) : random_(static_cast<uint64_t>(seed)) {}
+
+  void CastOn(GrayImage& image) {
+    if (shade_.empty()) Spill(image.width, image.height);
+    for (size_t i = 0; i < shade_.size(); ++i) {
+      image.pixels[i] = static_cast<uint8_t>(image.pixels[i] + shade_[i] * (kColor - image.pixels[i]));
+    }
+  }
+
+ private:
+  static constexpr float kColor = 40.0F, kOpacity = 0.9F;
+
+  double Draw() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
+
+  void Spill(int width_px, int height_px) {
+    shade_.assign(static_cast<size_t>(width_px) * static_cast<size_t>(height_px), 0.0F);
+    constexpr int kNumSpots = 15;
+    for (int spot = 0; spot < kNumSpots; ++spot) {
+      const double x_px = width_px * Draw();
+      const double y_px = height_px * Draw();
+      const double radius_px = 0.05 * height_px * (0.5 + Draw());
+      for (int y = 0; y < height_px; ++y) {
+        for (int x = 0; x < width_px; ++x) {
+          const double inside = (radius_px - std::hypot(x - x_px, y - y_px)) / (0.3 * radius_px);
+          float& shade = shade_[static_cast<size_t>(y) * static_cast<size_t>(width_px) + static_cast<size_t>(x)];
+          shade = std::max(shade, kOpacity * static_cast<float>(std::clamp(inside, 0.0, 1.0)));
+        }
+      }
+    }
+  }
+
+  std::mt19937_64 random_;
+  std::vector<float> shade_;
+};
 
 // A quarter turn clockwise.
 template <class Pixel>
@@ -105,6 +149,41 @@ class Gaps {
   int64_t num_left_ = 0;  // of the present gap, with the image that ends it
 };
 
+// Where frame k * every + 1 should be stands the one before, as the truth has it, too.
+void RepeatImages(FeatureSequence& sequence, int64_t every) {
+  std::map<FrameId, FrameId> shows;
+  for (size_t i = 1; i < sequence.frames.size(); ++i) {
+    if (static_cast<int64_t>(i) % every != 0) continue;
+    FeatureFrame repeated = sequence.frames[i - 1];
+    repeated.frame = sequence.frames[i].frame;
+    repeated.utime_us = sequence.frames[i].utime_us;
+    shows[repeated.frame] = sequence.frames[i - 1].frame;
+    sequence.frames[i] = std::move(repeated);
+  }
+  std::map<FrameId, Rigid3> truth;
+  for (const GroundTruthPose& pose : sequence.ground_truth) truth[pose.frame] = pose.world_from_camera;
+  for (GroundTruthPose& pose : sequence.ground_truth) {
+    const auto shown = shows.find(pose.frame);
+    if (shown != shows.end() && truth.contains(shown->second)) pose.world_from_camera = truth.at(shown->second);
+  }
+}
+
+// The truth stays that of the images.
+void Jitter(FeatureSequence& sequence, double jitter_s) {
+  std::mt19937_64 random(1);
+  std::map<FrameId, int64_t> utime_us;
+  int64_t last_us = std::numeric_limits<int64_t>::min();
+  for (FeatureFrame& frame : sequence.frames) {
+    const double share = 2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0;
+    frame.utime_us = std::max(last_us + 1, frame.utime_us + static_cast<int64_t>(1e6 * jitter_s * share));
+    utime_us[frame.frame] = last_us = frame.utime_us;
+  }
+  for (GroundTruthPose& pose : sequence.ground_truth) {
+    const auto frame = utime_us.find(pose.frame);
+    if (frame != utime_us.end()) pose.utime_us = frame->second;
+  }
+}
+
 // The last frame comes first, at the time of the first.
 void ReverseTime(FeatureSequence& sequence) {
   if (sequence.frames.empty()) return;
@@ -139,9 +218,13 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
   }
   Extractor extractor;
   Gaps gaps(variation.gaps);
+  Dirt dirt(variation.dirt);
   for (int64_t i = 0; auto frame = source->Next(); ++i) {
     if (i % variation.step != 0 || gaps.Contains(i)) continue;
     if (variation.is_mirrored) MirrorImage(frame->left);
+    if (variation.dirt != 0) dirt.CastOn(frame->left);
+    if (variation.dim > 1) Dim(frame->left, variation.dim);
+    if (variation.dim > 1) Dim(frame->right, variation.dim);
     for (int64_t turn = 0; turn < variation.quarter_turns; ++turn) {
       frame->left = Turned(frame->left);
       if (options.sensor == SensorType::kRgbd) frame->depth = Turned(frame->depth);
@@ -151,6 +234,8 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
       return ExtractFrame(*frame, sequence.calibration, feature_options, extractor, &num_corners);
     }));
   }
+  if (variation.repeat > 0) RepeatImages(sequence, variation.repeat);
+  if (variation.jitter_s > 0.0) Jitter(sequence, variation.jitter_s);
   if (variation.is_reversed) ReverseTime(sequence);
   if (variation.is_reversed || variation.step > 1 || variation.gaps != 0) Renumber(sequence);
   return sequence;

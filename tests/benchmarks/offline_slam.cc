@@ -2,7 +2,7 @@
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] [turn=0]
-//   [reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]
+//   [reverse=0] [step=1] [repeat=0] [jitter_ms=0] [dim=1] [dirt=0] [gaps=0] [min_focal=0] [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
 // With several delays, the sequence is played once with each; the spread tells what chance alone does to the errors.
@@ -72,6 +72,14 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.variation.quarter_turns = value;
     else if (key == "step")
       arguments.variation.step = value;
+    else if (key == "repeat")
+      arguments.variation.repeat = value;
+    else if (key == "jitter_ms")
+      arguments.variation.jitter_s = 1e-3 * static_cast<double>(value);
+    else if (key == "dim")
+      arguments.variation.dim = value;
+    else if (key == "dirt")
+      arguments.variation.dirt = value;
     else if (key == "gaps")
       arguments.variation.gaps = value;
     else
@@ -231,7 +239,8 @@ int main(int argc, char** argv) {
   if (argc < 4) {
     std::cerr
         << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] "
-           "[turn=0] [reverse=0] [step=1] [gaps=0] [min_focal=0] [vocabulary=FILE]\n";
+           "[turn=0] [reverse=0] [step=1] [repeat=0] [jitter_ms=0] [dim=1] [dirt=0] [gaps=0] [min_focal=0] "
+           "[vocabulary=FILE]\n";
     return 2;
   }
   try {
