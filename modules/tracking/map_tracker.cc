@@ -21,6 +21,7 @@ constexpr double kLongLost_s = 2.0;             // since the last pose: the came
 constexpr double kMaxSigmas = 5.0;              // an axis, of a motion that goes on
 constexpr double kMaxAcceleration_mps2 = 50.0;  // of any camera
 constexpr double kOnItsWay_s = 1.0;             // since the last pose: it moves as it did
+constexpr int64_t kMaxKept_us = 500'000;        // a pose, while images repeat
 constexpr double kMaxStanding_px = 3.0;         // in kDriftInterval_s, as noise has it
 constexpr double kExact = 1e12;                 // information about a pose that is taken as it is
 constexpr double kMinJump_px = 10.0;            // in the image
@@ -84,13 +85,15 @@ Result<> MapTracker::ApplyDelta(const MapDelta& delta) {
 }
 
 MapTrackingResult MapTracker::Track(const FeatureFrame& features, const RelocalizationAnswer* answer, bool may_ask) {
+  const bool is_repeated = repeated_.Contains(features);
+  if (is_repeated && answer == nullptr && MayKeepPose(features.utime_us)) return KeepPose(features);
   Watch(features);
   const CapturedFrame captured =
       times_.Captured(moving_things_.Without(own_body_.Without(features)), replica_.map().lens());
   const Frame& view = captured.view;
   calibration_ = features.calibration;
   const State before = state();
-  MapTrackingResult result = UndecidedResult(*view);
+  MapTrackingResult result = UndecidedResult(view->features(), view->size());
   if (last_) UpdateLast();
   const bool is_answered = answer != nullptr && TakeAnswer(*answer, view);
   if (is_answered) result.pose.relocalized_by = answer->frame;
@@ -125,6 +128,24 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   if (result.pose.state == TrackingState::kTracked) DescribePose(result);
   if (tracked_utime_us_) result.pose.since_tracked_us = features.utime_us - *tracked_utime_us_;
   previous_utime_us_ = features.utime_us;
+  return result;
+}
+
+// Images of a camera that is drawn, and stands, repeat for longer.
+bool MapTracker::MayKeepPose(int64_t utime_us) const {
+  return state() == State::kTracking && utime_us - last_->frame.view->features().utime_us <= kMaxKept_us;
+}
+
+// The camera is where the last frame has it, as far as anybody knows; what the next image shows is a step from there,
+// for as long as it took.
+MapTrackingResult MapTracker::KeepPose(const FeatureFrame& features) {
+  UpdateLast();
+  MapTrackingResult result = UndecidedResult(features, last_->frame.view->size());
+  result.pose.state = TrackingState::kTracked;
+  CountPoints(result.pose);
+  DescribePose(result);
+  tracked_utime_us_ = last_->frame.view->features().utime_us;
+  result.pose.since_tracked_us = features.utime_us - *tracked_utime_us_;
   return result;
 }
 
@@ -579,12 +600,12 @@ void MapTracker::WatchGround(const TrackedFrame& frame, const CaptureTimes::Step
                pose.evidence != StepEvidence::kWeak, reference_.id});
 }
 
-MapTrackingResult MapTracker::UndecidedResult(const FrameView& view) const {
+MapTrackingResult MapTracker::UndecidedResult(const FeatureFrame& features, int num_features) const {
   MapTrackingResult result;
-  result.pose.frame = view.features().frame;
-  result.pose.utime_us = view.features().utime_us;
-  result.pose.captured_us = view.features().captured_us;
-  result.pose.num_features = view.size();
+  result.pose.frame = features.frame;
+  result.pose.utime_us = features.utime_us;
+  result.pose.captured_us = features.captured_us;
+  result.pose.num_features = num_features;
   result.pose.num_landmarks = static_cast<int32_t>(replica_.map().landmarks().size());
   return result;
 }

@@ -31,6 +31,7 @@
 #include "tracking/own_body.h"
 #include "tracking/part_start.h"
 #include "tracking/reference_keyframe.h"
+#include "tracking/repeated_images.h"
 #include "tracking/scale_watch.h"
 #include "tracking/step_pose.h"
 #include "tracking/way_corrections.h"
@@ -84,6 +85,8 @@ class MapTracker {
   double scale_drift() const { return scale_.drift(); }
   // What moves with the camera; its keypoints take no part.
   const OwnBody& own_body() const { return own_body_; }
+  // Images that were those before, once more.
+  int64_t num_repeated() const { return repeated_.num(); }
   // What was learned of the camera.
   const CaptureTimes& times() const { return times_; }
 
@@ -139,7 +142,9 @@ class MapTracker {
   void WatchScale();
   void WatchGround(const TrackedFrame& frame, const CaptureTimes::Step& step, const StepPose& pose);
 
-  MapTrackingResult UndecidedResult(const FrameView& view) const;
+  MapTrackingResult UndecidedResult(const FeatureFrame& features, int num_features) const;
+  bool MayKeepPose(int64_t utime_us) const;
+  MapTrackingResult KeepPose(const FeatureFrame& features);
   void CountPoints(PoseEstimate& pose) const;
   void DescribePose(MapTrackingResult& result);
   BodyState DescribeBody() const;
@@ -152,6 +157,7 @@ class MapTracker {
   std::optional<LocalizedFrame> last_;  // that was tracked; nullopt: no part of the map is followed
   MotionModel motion_;                  // in the reference's units
   CaptureTimes times_;
+  RepeatedImages repeated_;
   OwnBody own_body_;
   MovingThings moving_things_;
   FrameId watched_frame_;        // the last that both were shown

@@ -113,6 +113,51 @@ TEST(MapTracker, NothingIsExpectedOfAKeyframeWhoseWayImagesFix) {
   for (const KeyframeObservation& keyframe : outcome.keyframes) EXPECT_FALSE(keyframe.expected.is_known());
 }
 
+// As of a video whose rate was raised. A step of twice the length takes twice the time.
+TEST(MapTracker, ARepeatedImageKeepsThePoseAndSaysNothingOfTheMotion) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  FeatureFrame last;
+  Eigen::Vector3d pose_before = Eigen::Vector3d::Zero();
+  for (int64_t step = 0; step < 12; ++step) {
+    FeatureFrame features = world.Take(step).features;
+    const bool is_repeated = step % 4 == 3;
+    if (is_repeated) {
+      last.frame = features.frame;
+      last.utime_us = features.utime_us;
+      features = last;
+    }
+    const MapTrackingResult result = tracker.Track(features);
+    ASSERT_EQ(result.pose.state, TrackingState::kTracked) << step;
+    EXPECT_EQ(result.pose.frame, features.frame);
+    EXPECT_EQ(result.pose.since_tracked_us, is_repeated ? 100'000 : 0) << step;
+    EXPECT_GT(result.pose.num_inliers, 0);
+    if (is_repeated) {
+      EXPECT_TRUE(result.keyframes.empty());
+      EXPECT_EQ(result.pose.world_from_camera.translation, pose_before);
+    }
+    if (step > 4) {
+      EXPECT_NEAR(result.pose.body.motion.velocity.norm(), 5.0, 0.5) << step;
+    }
+    pose_before = result.pose.world_from_camera.translation;
+    last = std::move(features);
+  }
+  EXPECT_EQ(tracker.num_repeated(), 3);
+}
+
+TEST(MapTracker, ADrawnCameraThatStandsIsTrackedThoughItsImagesRepeat) {
+  SyntheticWorld world(SensorType::kStereo, 0.3);
+  MapTracker tracker{MapTrackerOptions{}};
+  FeatureFrame features = world.Take(0).features;
+  for (int64_t step = 0; step < 20; ++step) {
+    features.frame = {step};
+    features.utime_us = 100'000 * step;
+    const MapTrackingResult result = tracker.Track(features);
+    EXPECT_EQ(result.pose.state, TrackingState::kTracked) << step;
+    EXPECT_LE(result.pose.since_tracked_us, 500'000) << step;
+  }
+}
+
 TEST(MapTracker, FollowsAMonoDriveUpToScale) {
   const SyntheticWorld world(SensorType::kMono, 0.3);
   Outcome outcome;

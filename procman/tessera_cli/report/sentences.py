@@ -34,6 +34,7 @@ def headline(result: Result) -> list[str]:
         _lens(result),
         _readout(result),
         _own_body(result),
+        _repeated(result),
         _failures(result),
     ]
     return [sentence for sentence in sentences if sentence]
@@ -148,6 +149,17 @@ def _own_body(result: Result) -> str:
     return (
         f"{100 * share:.0f} % of the image moves with the camera (what carries it, a time stamp, dirt on the lens): "
         "keypoints there were left out."
+    )
+
+
+def _repeated(result: Result) -> str:
+    """Images that came once more in place of new ones."""
+    num = int(_values(result, "tracker").get("images_repeated") or 0)
+    if not num:
+        return ""
+    return (
+        f"{count(num, 'image')} of {result.summary.get('frames', 0):,} only repeated the one before, as those of a "
+        "busy camera do, or of a video of raised rate: the pose stays there until the next."
     )
 
 

@@ -186,6 +186,13 @@ def test_what_moves_with_the_camera_is_told(tmp_path: Path) -> None:
         assert len(told) == bool(words) and (not told or words in told[0])
 
 
+def test_images_that_only_repeat_the_one_before_are_told(tmp_path: Path) -> None:
+    for num, words in [(12, "12 images of "), (1, "1 image of "), (0, "")]:
+        folder = write_run(tmp_path / f"{num}", stage_values={"tracker": {"images_repeated": num}})
+        told = [sentence for sentence in headline(read_run(folder)) if "only repeated the one before" in sentence]
+        assert len(told) == bool(words) and (not told or told[0].startswith(words))
+
+
 def test_a_run_in_which_no_frame_was_tracked(tmp_path: Path) -> None:
     folder = write_run(
         tmp_path / "drive", loops=False, frames_tracked=0, pose_time_ms=None, latency_ms=None, map_wait_ms=None
