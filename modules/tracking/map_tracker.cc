@@ -131,7 +131,7 @@ MapTrackingResult MapTracker::Track(const FeatureFrame& features, const Relocali
   return result;
 }
 
-// Images of a camera that is drawn, and stands, repeat for longer.
+// Images of a rendered world repeat for longer, while the camera stands.
 bool MapTracker::MayKeepPose(int64_t utime_us) const {
   return state() == State::kTracking && utime_us - last_->frame.view->features().utime_us <= kMaxKept_us;
 }

@@ -216,6 +216,8 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
     sequence.calibration = Turned(sequence.calibration);
     for (GroundTruthPose& pose : sequence.ground_truth) pose.world_from_camera = Turned(pose.world_from_camera);
   }
+  sequence.calibration.fx_px *= 1.0 + variation.focal_error;
+  sequence.calibration.fy_px *= 1.0 + variation.focal_error;
   Extractor extractor;
   Gaps gaps(variation.gaps);
   Dirt dirt(variation.dirt);

@@ -31,6 +31,7 @@ struct Variation {
   int64_t quarter_turns = 0;  // clockwise, of the images: a phone upright, a camera upside down; not of a stereo pair
   bool is_reversed = false;   // the last image comes first, as long before the next as it came after it
   int64_t step = 1;           // only each step-th image
+  double focal_error = 0.0;   // by which share the calibration's focal lengths are too long
   int64_t repeat = 0;     // each repeat-th image once more in place of the next, as in videos of changed rate; 0: none
   double jitter_s = 0.0;  // times are wrong by up to so much, evenly
   int64_t dim = 1;        // so much less light, and so fewer gray values

@@ -2,7 +2,8 @@
 // taken in logical time, and tells accuracy and the CPU time of each step.
 //
 //   offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] [turn=0]
-//   [reverse=0] [step=1] [repeat=0] [jitter_ms=0] [dim=1] [dirt=0] [gaps=0] [min_focal=0] [vocabulary=FILE]
+//   [reverse=0] [step=1] [focal_percent=0] [repeat=0] [jitter_ms=0] [dim=1] [dirt=0] [gaps=0] [min_focal=0]
+//   [vocabulary=FILE]
 //   offline_slam kitti:../shared/data/kitti/sequences/03 mono /tmp/k03 last=300
 //
 // With several delays, the sequence is played once with each; the spread tells what chance alone does to the errors.
@@ -72,6 +73,8 @@ Arguments ParseArguments(int argc, char** argv) {
       arguments.variation.quarter_turns = value;
     else if (key == "step")
       arguments.variation.step = value;
+    else if (key == "focal_percent")
+      arguments.variation.focal_error = 0.01 * static_cast<double>(value);
     else if (key == "repeat")
       arguments.variation.repeat = value;
     else if (key == "jitter_ms")
@@ -239,8 +242,8 @@ int main(int argc, char** argv) {
   if (argc < 4) {
     std::cerr
         << "usage: offline_slam SOURCE SENSOR OUT_DIR [first=0] [last=-1] [delay=3[,4...]] [features=2000] [mirror=0] "
-           "[turn=0] [reverse=0] [step=1] [repeat=0] [jitter_ms=0] [dim=1] [dirt=0] [gaps=0] [min_focal=0] "
-           "[vocabulary=FILE]\n";
+           "[turn=0] [reverse=0] [step=1] [focal_percent=0] [repeat=0] [jitter_ms=0] [dim=1] [dirt=0] [gaps=0] "
+           "[min_focal=0] [vocabulary=FILE]\n";
     return 2;
   }
   try {

@@ -145,7 +145,7 @@ TEST(MapTracker, ARepeatedImageKeepsThePoseAndSaysNothingOfTheMotion) {
   EXPECT_EQ(tracker.num_repeated(), 3);
 }
 
-TEST(MapTracker, ADrawnCameraThatStandsIsTrackedThoughItsImagesRepeat) {
+TEST(MapTracker, ACameraThatStandsInARenderedWorldIsTrackedThoughItsImagesRepeat) {
   SyntheticWorld world(SensorType::kStereo, 0.3);
   MapTracker tracker{MapTrackerOptions{}};
   FeatureFrame features = world.Take(0).features;
