@@ -54,6 +54,9 @@ Rigid3 Mirrored(const Rigid3& pose) {
   return {Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()), {-t.x(), t.y(), t.z()}};
 }
 
+// From 0 to 1, evenly.
+double Draw(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
+
 void Dim(GrayImage& image, int64_t times) {
   for (uint8_t& pixel : image.pixels) pixel = static_cast<uint8_t>((pixel + times / 2) / times);
 }
@@ -73,15 +76,13 @@ class Dirt {
  private:
   static constexpr float kColor = 40.0F, kOpacity = 0.9F;
 
-  double Draw() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
-
   void Spill(int width_px, int height_px) {
     shade_.assign(static_cast<size_t>(width_px) * static_cast<size_t>(height_px), 0.0F);
     constexpr int kNumSpots = 15;
     for (int spot = 0; spot < kNumSpots; ++spot) {
-      const double x_px = width_px * Draw();
-      const double y_px = height_px * Draw();
-      const double radius_px = 0.05 * height_px * (0.5 + Draw());
+      const double x_px = width_px * Draw(random_);
+      const double y_px = height_px * Draw(random_);
+      const double radius_px = 0.05 * height_px * (0.5 + Draw(random_));
       for (int y = 0; y < height_px; ++y) {
         for (int x = 0; x < width_px; ++x) {
           const double inside = (radius_px - std::hypot(x - x_px, y - y_px)) / (0.3 * radius_px);
@@ -149,7 +150,7 @@ class Gaps {
   int64_t num_left_ = 0;  // of the present gap, with the image that ends it
 };
 
-// Where frame k * every + 1 should be stands the one before, as the truth has it, too.
+// In place of each `every`-th image stands the one before it, and so does the truth.
 void RepeatImages(FeatureSequence& sequence, int64_t every) {
   std::map<FrameId, FrameId> shows;
   for (size_t i = 1; i < sequence.frames.size(); ++i) {
@@ -174,7 +175,7 @@ void Jitter(FeatureSequence& sequence, double jitter_s) {
   std::map<FrameId, int64_t> utime_us;
   int64_t last_us = std::numeric_limits<int64_t>::min();
   for (FeatureFrame& frame : sequence.frames) {
-    const double share = 2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0;
+    const double share = 2.0 * Draw(random) - 1.0;
     frame.utime_us = std::max(last_us + 1, frame.utime_us + static_cast<int64_t>(1e6 * jitter_s * share));
     utime_us[frame.frame] = last_us = frame.utime_us;
   }
@@ -225,8 +226,10 @@ FeatureSequence ExtractSequence(const SourceOptions& options, const FeatureOptio
     if (i % variation.step != 0 || gaps.Contains(i)) continue;
     if (variation.is_mirrored) MirrorImage(frame->left);
     if (variation.dirt != 0) dirt.CastOn(frame->left);
-    if (variation.dim > 1) Dim(frame->left, variation.dim);
-    if (variation.dim > 1) Dim(frame->right, variation.dim);
+    if (variation.dim > 1) {
+      Dim(frame->left, variation.dim);
+      Dim(frame->right, variation.dim);
+    }
     for (int64_t turn = 0; turn < variation.quarter_turns; ++turn) {
       frame->left = Turned(frame->left);
       if (options.sensor == SensorType::kRgbd) frame->depth = Turned(frame->depth);

@@ -32,11 +32,11 @@ struct Variation {
   bool is_reversed = false;   // the last image comes first, as long before the next as it came after it
   int64_t step = 1;           // only each step-th image
   double focal_error = 0.0;   // by which share the calibration's focal lengths are too long
-  int64_t repeat = 0;     // each repeat-th image once more in place of the next, as in videos of changed rate; 0: none
-  double jitter_s = 0.0;  // times are wrong by up to so much, evenly
-  int64_t dim = 1;        // so much less light, and so fewer gray values
-  int64_t dirt = 0;       // seed of dark spots on the lens, a twentieth of the image; 0: none
-  int64_t gaps = 0;       // seed of where images lack, as when USB is busy: a fifth, 2 to 8 in a row; 0: none
+  int64_t repeat = 0;         // each repeat-th image is the one before once more, as in videos of raised rate; 0: none
+  double jitter_s = 0.0;      // times are wrong by up to so much, evenly
+  int64_t dim = 1;            // so much less light, and so fewer gray values
+  int64_t dirt = 0;           // seed of 15 dark spots on the lens; 0: none
+  int64_t gaps = 0;           // seed of where images lack, as when USB is busy: a fifth, 2 to 8 in a row; 0: none
 };
 
 // Reads and extracts. Throws InputError as OpenSource does, or if there can be no such variation.
