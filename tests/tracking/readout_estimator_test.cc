@@ -58,29 +58,26 @@ class ReadoutEstimatorTest : public ::testing::Test {
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
 };
 
-TEST_F(ReadoutEstimatorTest, FindsTheReadoutOfARollingShutter) {
-  Show(200, {.down_s = 0.025});
-  EXPECT_NEAR(estimator_.readout().down_s, 0.025, 0.001);
-  EXPECT_EQ(estimator_.readout().across_s, 0.0);
+struct ReadCase {
+  const char* name;  // of the camera
+  Readout readout;
+};
+
+class WaysToReadTest : public ReadoutEstimatorTest, public ::testing::WithParamInterface<ReadCase> {};
+
+TEST_P(WaysToReadTest, AreFound) {
+  const Readout& readout = GetParam().readout;
+  Show(200, readout);
+  EXPECT_NEAR(estimator_.readout().down_s, readout.down_s, readout.down_s != 0.0 ? 0.001 : 0.0);
+  EXPECT_NEAR(estimator_.readout().across_s, readout.across_s, readout.across_s != 0.0 ? 0.001 : 0.0);
 }
 
-TEST_F(ReadoutEstimatorTest, ACameraThatHangsUpsideDownReadsFromTheBottom) {
-  Show(200, {.down_s = -0.025});
-  EXPECT_NEAR(estimator_.readout().down_s, -0.025, 0.001);
-  EXPECT_EQ(estimator_.readout().across_s, 0.0);
-}
-
-TEST_F(ReadoutEstimatorTest, ACameraOnItsSideReadsColumns) {
-  Show(200, {.across_s = 0.025});
-  EXPECT_NEAR(estimator_.readout().across_s, 0.025, 0.001);
-  EXPECT_EQ(estimator_.readout().down_s, 0.0);
-}
-
-TEST_F(ReadoutEstimatorTest, ACameraOnItsOtherSideReadsThemFromTheRight) {
-  Show(200, {.across_s = -0.025});
-  EXPECT_NEAR(estimator_.readout().across_s, -0.025, 0.001);
-  EXPECT_EQ(estimator_.readout().down_s, 0.0);
-}
+INSTANTIATE_TEST_SUITE_P(OfACamera, WaysToReadTest,
+                         ::testing::Values(ReadCase{"Upright", {.down_s = 0.025}},
+                                           ReadCase{"UpsideDown", {.down_s = -0.025}},
+                                           ReadCase{"OnItsSide", {.across_s = 0.025}},
+                                           ReadCase{"OnItsOtherSide", {.across_s = -0.025}}),
+                         [](const auto& read_case) { return read_case.param.name; });
 
 // As of a camera that turns about the vertical in a map that isn't exact.
 TEST_F(ReadoutEstimatorTest, ColumnsThatExplainLittleOfWhatIsSeenArentReadSo) {
