@@ -106,6 +106,7 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
                                                {"scale", &options.scale},
                                                {"readout", &options.readout_ms},
                                                {"depth_delay", &options.depth_delay_ms},
+                                               {"right_delay", &options.right_delay_ms},
                                                {"stop", &options.stop_m},
                                                {"body", &options.body},
                                                {"people", &options.people},
@@ -118,10 +119,10 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
     options.seed = static_cast<uint32_t>(number);
   } else {
-    throw InputError(
-        "sim: `" + key + "=" + value +
-        "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-        "depth_delay (ms), stop (m), people, bumps, squint, twist, body, stamp, speed, noise, scale or path");
+    throw InputError("sim: `" + key + "=" + value +
+                     "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
+                     "depth_delay (ms), right_delay (ms), stop (m), people, bumps, squint, twist, body, stamp, speed, "
+                     "noise, scale or path");
   }
 }
 
@@ -138,6 +139,9 @@ Result<> SimulationOptions::Check() const {
   }
   if (!(depth_delay_ms >= -100.0 && depth_delay_ms <= 100.0)) {
     return Failed("sim: depth_delay must be between -100 and 100 ms");
+  }
+  if (!(right_delay_ms >= -100.0 && right_delay_ms <= 100.0)) {
+    return Failed("sim: right_delay must be between -100 and 100 ms");
   }
   if (!(body >= 0.0 && body <= 0.5)) return Failed("sim: body must be between 0 and 0.5 of the image's height");
   if (!(people >= 0.0 && people <= 8.0)) return Failed("sim: people must be between 0 and 8");
@@ -319,8 +323,9 @@ CameraFrame Simulation::Render(FrameId id) {
       frame.depth = effects_->Depth(rendering_, picture);
     }
   } else if (camera_.sensor == SensorType::kStereo) {
-    RenderEye(time, camera_.baseline_m, rendering_);
-    frame.right = effects_->Apply(rendering_, velocity, time, picture + 1);
+    const double right_time = time + 0.001 * options_.right_delay_ms;
+    RenderEye(right_time, camera_.baseline_m, rendering_);
+    frame.right = effects_->Apply(rendering_, VelocityAt(right_time), right_time, picture + 1);
     if (options_.stamp > 0.0) StampTime(time, frame.right);
   }
   return frame;

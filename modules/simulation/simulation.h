@@ -36,6 +36,7 @@ struct SimulationOptions {
   double scale = 1.0;           // times the usual size of images
   double readout_ms = -1.0;     // rolling shutter: from the first row to the last; -1: that of the world's camera
   double depth_delay_ms = 0.0;  // RGB-D: depth is taken so much later than the image, as by a Kinect
+  double right_delay_ms = 0.0;  // stereo: the right image is taken so much later than the left one
   double stop_m = 12.0;         // traffic: it stops so far before the middle of a crossing
   double body = 0.0;            // share of the image's height that shows the car or robot itself, at the bottom
   double people = 3.0;          // office: who walks around

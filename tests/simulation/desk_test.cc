@@ -122,6 +122,14 @@ TEST(DepthDelay, DepthIsThatOfALaterMomentAndTheImageIsNot) {
   EXPECT_LT(share_equal(then.depth), 0.5);
 }
 
+TEST(RightDelay, TheRightImageIsThatOfALaterMoment) {
+  Simulation simulation(ParseSimulation("desk,readout=0,noise=0,scale=0.5"), SensorType::kStereo);
+  Simulation late(ParseSimulation("desk,readout=0,noise=0,scale=0.5,right_delay=100"), SensorType::kStereo);
+  const CameraFrame delayed = late.Render(FrameId{40});
+  EXPECT_EQ(delayed.left, simulation.Render(FrameId{40}).left);
+  EXPECT_EQ(delayed.right, simulation.Render(FrameId{43}).right);  // three frames
+}
+
 TEST(Desk, MostPixelsHaveADepthThatIsThatOfTheDrawing) {
   Simulation simulation(ParseSimulation("desk"), SensorType::kRgbd);
   const CameraFrame frame = simulation.Render(FrameId{150});

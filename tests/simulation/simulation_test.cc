@@ -239,7 +239,7 @@ TEST(ParseSimulation, ReadsOptions) {
 TEST(ParseSimulation, RefusesNonsense) {
   for (const char* text : {"", "moon", "street,", "street,seed", "street,seed=x", "street,seed=-1", "street,speed=0",
                            "street,noise=-1", "street,scale=100", "room,color=1", "street,length=nan", "street,seed=3 ",
-                           "desk,readout=-2", "desk,readout=500", "desk,depth_delay=150"}) {
+                           "desk,readout=-2", "desk,readout=500", "desk,depth_delay=150", "desk,right_delay=150"}) {
     EXPECT_THROW(ParseSimulation(text), InputError) << text;
   }
   EXPECT_THROW(Simulation(ParseSimulation("street,path=/nowhere"), SensorType::kMono), InputError);
