@@ -1,22 +1,21 @@
 #include "tracking/capture_times.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "core/time_units.h"
+#include "measurement/right_delay.h"
 
 namespace tessera {
 namespace {
 
-// Of two frames, for their poses to tell how the camera moved while an image was read.
+// Of two frames, for their poses to tell how the camera moved while an image was read or depths were measured, ...
 constexpr double kMaxFrameInterval_s = 0.07;
+// ... and while it waited for the right camera: less accurate, but better than not at all.
+constexpr double kMaxPairInterval_s = 0.15;
 constexpr double kMinDelay_s = 0.001;  // of depths: in less, a turn moves an image by less than a pixel
-
-std::optional<CameraMotion> MeanMotion(const std::optional<CaptureTimes::Step>& step) {
-  if (!step || step->interval_s > kMaxFrameInterval_s) return std::nullopt;
-  return MotionOver(step->last_from_current, step->interval_s);
-}
 
 }  // namespace
 
@@ -44,37 +43,60 @@ void CaptureTimes::Follow(const std::optional<Step>& step) {
   mean_motion_ = MeanMotion(step);
 }
 
-void CaptureTimes::Learn(const TrackedFrame& tracked, const Rigid3& world_from_reference) {
-  if (!motion_ || !motion_at_reference_) return;
-  const MovingView reference{world_from_reference, *motion_at_reference_};
-  readout_.Add(tracked, *motion_, reference);
-  depth_delay_.Add(tracked, *motion_, reference);
+void CaptureTimes::Learn(const TrackedFrame& tracked, const Rigid3& world_from_reference, const MapReplica& replica) {
+  if (!motion_) return;
+  const CameraMotion& motion = motion_->motion;
+  right_delay_.Add(tracked, motion, replica);
+  if (!motion_at_reference_) return;
+  if (std::max(motion_->interval_s, motion_at_reference_->interval_s) > kMaxFrameInterval_s) return;
+  const MovingView reference{world_from_reference, motion_at_reference_->motion};
+  readout_.Add(tracked, motion, reference);
+  depth_delay_.Add(tracked, motion, reference);
+}
+
+void CaptureTimes::BecomeReference(KeyframeId id) {
+  motion_at_reference_ = motion_;
+  right_delay_.AddKeyframe(id, motion_ ? std::optional(motion_->motion) : std::nullopt);
 }
 
 void CaptureTimes::ForgetMotion() {
   mean_motion_.reset();
   motion_.reset();
   motion_at_reference_.reset();
+  right_delay_.ForgetMotion();
+}
+
+std::optional<CaptureTimes::KnownMotion> CaptureTimes::MeanMotion(const std::optional<Step>& step) {
+  if (!step || step->interval_s > kMaxPairInterval_s) return std::nullopt;
+  return KnownMotion{MotionOver(step->last_from_current, step->interval_s), step->interval_s};
 }
 
 // The mean motion is that of half an interval ago.
-std::optional<CameraMotion> CaptureTimes::MotionAtEnd(const std::optional<Step>& step) const {
-  std::optional<CameraMotion> motion = MeanMotion(step);
-  if (!motion || !mean_motion_) return motion;
-  motion->velocity += 0.5 * (motion->velocity - mean_motion_->velocity);
-  motion->turn_rate += 0.5 * (motion->turn_rate - mean_motion_->turn_rate);
-  return motion;
+std::optional<CaptureTimes::KnownMotion> CaptureTimes::MotionAtEnd(const std::optional<Step>& step) const {
+  std::optional<KnownMotion> known = MeanMotion(step);
+  if (!known || !mean_motion_) return known;
+  CameraMotion& motion = known->motion;
+  motion.velocity += 0.5 * (motion.velocity - mean_motion_->motion.velocity);
+  motion.turn_rate += 0.5 * (motion.turn_rate - mean_motion_->motion.turn_rate);
+  return known;
 }
 
 CaptureTimes::Frame CaptureTimes::Moved(const CapturedFrame& captured, const TrackedFrame& last,
-                                        const TrackedFrame& tracked, const std::optional<CameraMotion>& motion) const {
-  const bool is_rolling = readout().is_rolling(), is_late = captured.depth_delay_s != 0.0;
-  if (!motion || (!is_rolling && !is_late)) return captured.view;
-  FeatureFrame features = is_late
-                              ? WithDepthsOfImage(*captured.view, captured.surfaces, captured.depth_delay_s, *motion)
-                              : captured.view->features();
-  return std::make_shared<const FrameView>(is_rolling ? Unrolled(features, last, tracked, *motion)
-                                                      : std::move(features));
+                                        const TrackedFrame& tracked, const std::optional<KnownMotion>& known) const {
+  if (!known) return captured.view;
+  const CameraMotion& motion = known->motion;
+  const bool is_known_well = known->interval_s <= kMaxFrameInterval_s;
+  const bool is_rolling = is_known_well && readout().is_rolling();
+  const bool has_late_depths = is_known_well && captured.depth_delay_s != 0.0;
+  const double right_delay_s = this->right_delay_s();
+  if (!is_rolling && !has_late_depths && right_delay_s == 0.0) return captured.view;
+  FeatureFrame features = captured.view->features();
+  if (has_late_depths) {
+    features = WithDepthsOfImage(*captured.view, captured.surfaces, captured.depth_delay_s, motion);
+  }
+  if (right_delay_s != 0.0) features = WithRightColumnsOfImage(features, right_delay_s, motion);
+  if (is_rolling) features = Unrolled(features, last, tracked, motion);
+  return std::make_shared<const FrameView>(std::move(features));
 }
 
 FeatureFrame CaptureTimes::Unrolled(const FeatureFrame& rolled, const TrackedFrame& last, const TrackedFrame& tracked,

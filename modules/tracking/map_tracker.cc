@@ -374,7 +374,7 @@ void MapTracker::Remember(TrackedFrame frame, const StepPose& pose, bool is_wide
   }
   if (step) WatchGround(frame, *step, pose);
   times_.Follow(step);
-  if (replica_.WorldFromKeyframe(reference_.id)) times_.Learn(frame, world_from_reference.Pose());
+  if (replica_.WorldFromKeyframe(reference_.id)) times_.Learn(frame, world_from_reference.Pose(), replica_);
   lost_since_us_.reset();
   scene_.See(pose, frame.view->features().utime_us);
   const int num_known = frame.NumPoints();
@@ -561,7 +561,7 @@ KeyframeObservation MapTracker::MakeKeyframe(LocalizedFrame& localized) {
                 .frame = frame,
                 .motion = ReferenceKeyframe::MotionAt{motion_, keyframe.features.utime_us},
                 .influences = InfluencesOnReference(localized, begins_part)};
-  times_.BecomeReference();
+  times_.BecomeReference(id);
   ++next_keyframe_.value;
   localized.reference_from_camera = Rigid3::Identity();
   return keyframe;

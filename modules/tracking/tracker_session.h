@@ -63,6 +63,7 @@ class TrackerSession {
   double scale_drift() const { return tracker_.scale_drift(); }
   Readout readout() const { return tracker_.times().readout(); }
   double depth_delay_s() const { return tracker_.times().depth_delay_s(); }
+  double right_delay_s() const { return tracker_.times().right_delay_s(); }
   int64_t num_repeated() const { return tracker_.num_repeated(); }
   double own_body_share() const { return tracker_.own_body().share(); }
   // The question that was sent and is not answered yet, to be sent again from time to time: a loop closer that was

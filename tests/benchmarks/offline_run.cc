@@ -339,6 +339,7 @@ void Play(const std::vector<FeatureFrame>& frames, const MapTrackerOptions& trac
     run.poses.push_back(result.pose);
     run.readout = tracker.times().readout();
     run.depth_delay_s = tracker.times().depth_delay_s();
+    run.right_delay_s = tracker.times().right_delay_s();
     const bool is_lost = result.pose.state == TrackingState::kLost;
     run.num_lost += is_lost ? 1 : 0;
     run.num_failures += is_lost && !was_lost ? 1 : 0;

@@ -56,6 +56,7 @@ struct OfflineRun {
   int num_relocalized = 0;                                   // frames that a loop closer has placed
   Readout readout;                                           // as learned by the end (MapTracker)
   double depth_delay_s = 0.0;                                // likewise
+  double right_delay_s = 0.0;                                // likewise
   std::vector<double> track_ms, map_ms, loop_ms, adjust_ms;  // CPU time by frame, by keyframe
 
   // Poses of tracked frames: as known at the time, and after all optimization.

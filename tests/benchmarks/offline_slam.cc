@@ -186,8 +186,8 @@ void Report(const FeatureSequence& sequence, const OfflineRun& run) {
               map.Sha256Hex().c_str());
   std::printf("RMS error %.4f m, live %.4f m\n", RmsError(optimized, sequence.ground_truth, is_mono).value_or(-1.0),
               RmsError(run.Live(), sequence.ground_truth, is_mono).value_or(-1.0));
-  std::printf("readout %.1f ms down, %.1f ms across, depths %.1f ms later\n", 1e3 * run.readout.down_s,
-              1e3 * run.readout.across_s, 1e3 * run.depth_delay_s);
+  std::printf("readout %.1f ms down, %.1f ms across, depths %.1f ms later, right images %.1f ms later\n",
+              1e3 * run.readout.down_s, 1e3 * run.readout.across_s, 1e3 * run.depth_delay_s, 1e3 * run.right_delay_s);
   std::printf("lens found: fx %.2f px (0: as calibrated), radial %+.4f, right %+.3f %+.3f %+.3f %+.3f\n",
               map.lens().fx_px, map.lens().radial, map.lens().right_shift.center_px, map.lens().right_shift.across_px,
               map.lens().right_shift.down_px, map.lens().right_shift.bend_px);

@@ -117,6 +117,7 @@ void TrackerStage::Do(TrackerActions actions, int64_t began_us) {
   context_.SetValue("readout_ms", 1e3 * readout.down_s);
   context_.SetValue("readout_across_ms", 1e3 * readout.across_s);
   context_.SetValue("depth_delay_ms", 1e3 * session_.depth_delay_s());
+  context_.SetValue("right_delay_ms", 1e3 * session_.right_delay_s());
   context_.SetValue("images_repeated", static_cast<double>(session_.num_repeated()));
   context_.SetValue("own_body_share", session_.own_body_share());
 }

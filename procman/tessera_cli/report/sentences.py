@@ -120,10 +120,10 @@ def _values(result: Result, stage: str) -> dict[str, float]:
 
 
 def _readout(result: Result) -> str:
-    """What the tracker learned of when rows and depths are read."""
+    """What the tracker learned of when rows, depths and right images are taken."""
     values = _values(result, "tracker")
     down_ms, across_ms = values.get("readout_ms") or 0.0, values.get("readout_across_ms") or 0.0
-    delay_ms = values.get("depth_delay_ms") or 0.0
+    delay_ms, right_ms = values.get("depth_delay_ms") or 0.0, values.get("right_delay_ms") or 0.0
     found = []
     if down_ms or across_ms:
         if across_ms:
@@ -134,6 +134,9 @@ def _readout(result: Result) -> str:
     if delay_ms:
         when = "after" if delay_ms > 0 else "before"
         found.append(f"depths are measured {abs(delay_ms):.0f} ms {when} the time they are said to be of")
+    if right_ms:
+        when = "after" if right_ms > 0 else "before"
+        found.append(f"the right camera takes its image {abs(right_ms):.1f} ms {when} the left one")
     if not found:
         return ""
     sentence = " and ".join(found)

@@ -179,6 +179,18 @@ def test_a_rolling_shutter_and_late_depths_are_told(tmp_path: Path) -> None:
         assert len(told) == bool(words) and (not told or words in told[0])
 
 
+def test_a_right_camera_that_is_late_is_told(tmp_path: Path) -> None:
+    for delay_ms, words in [
+        (4.93, "The right camera takes its image 4.9 ms after the left one"),
+        (-2.06, "The right camera takes its image 2.1 ms before the left one"),
+        (0.0, ""),
+    ]:
+        values = {"tracker": {"right_delay_ms": delay_ms}}
+        folder = write_run(tmp_path / f"{delay_ms}", sensor="stereo", stage_values=values)
+        told = [sentence for sentence in headline(read_run(folder)) if "corrected for it" in sentence]
+        assert len(told) == bool(words) and (not told or told[0].startswith(words))
+
+
 def test_what_moves_with_the_camera_is_told(tmp_path: Path) -> None:
     for share, words in [(0.057, "6 % of the image moves with the camera"), (0.0, "")]:
         folder = write_run(tmp_path / f"{share}", sensor="rgbd", stage_values={"tracker": {"own_body_share": share}})
