@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+#include <vector>
+
 #include "support/vga_camera.h"
 
 namespace tessera {
@@ -86,6 +90,61 @@ TEST_F(CaptureTimesTest, ForgetsTheMotion) {
   times_.Follow(Turn(0.05));
   times_.ForgetMotion();
   EXPECT_EQ(times_.AtOneTime(late_, last_), late_.view);
+}
+
+// Turns by steps of random length, the right image 6 ms later than the left one, at 10 images a second: too few to tell
+// a readout, but not this.
+TEST(CaptureTimes, RightColumnsAreMovedToTheTimeOfTheLeftImage) {
+  constexpr double kDelay_s = 0.006, kInterval_s = 0.1;
+  CameraCalibration camera = VgaCamera(SensorType::kStereo);
+  camera.baseline_m = 0.1;
+  std::mt19937 random(5);
+  std::normal_distribution<double> gaussian;
+  std::uniform_real_distribution<double> uniform;
+  MapReplica replica;
+  replica.Send(KeyframeId{0}, {KeyframeId{}, Rigid3::Identity(), {}});
+  CaptureTimes times;
+  times.BecomeReference(KeyframeId{0});
+  double last_turn_rad = 0.0, off_px = 0.0, moved_off_px = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    const double turn_rad = k == 0 ? 0.0 : 0.1 * gaussian(random);
+    const double rate = (turn_rad + 0.5 * (turn_rad - last_turn_rad)) / kInterval_s;  // at the end of the step
+    last_turn_rad = turn_rad;
+    const Eigen::Quaterniond later_from_now = ExpSO3({0.0, -kDelay_s * rate, 0.0});
+    FeatureFrame features;
+    features.calibration = camera;
+    std::vector<SeenPoint> points;
+    std::vector<double> right_columns;
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector2d pixel(150.0 + 490.0 * uniform(random), 480.0 * uniform(random));
+      const Eigen::Vector3d point = (1.0 + 2.0 * uniform(random)) * camera.Ray(pixel);
+      const Eigen::Vector3d baseline(camera.baseline_m, 0.0, 0.0);
+      right_columns.push_back(camera.Project(point - baseline).x());
+      const double noise_px = 0.3 * gaussian(random);
+      features.keypoints.push_back(
+          {.x_px = static_cast<float>(pixel.x()),
+           .y_px = static_cast<float>(pixel.y()),
+           .right_x_px = static_cast<float>(camera.Project(later_from_now * point - baseline).x() + noise_px)});
+      points.push_back({{LandmarkId{}, KeyframeId{0}, i}, {}});
+      points.back().landmark.position_in_world = point;
+    }
+    features.descriptors.resize(features.keypoints.size());
+    const CapturedFrame captured = times.Captured(features, {});
+    const CaptureTimes::Step step{{ExpSO3({0.0, turn_rad, 0.0}), Eigen::Vector3d::Zero()}, kInterval_s};
+    TrackedFrame tracked(times.AtOneTime(captured, TrackedFrame(captured.view), TrackedFrame(captured.view), step));
+    tracked.points = points;
+    if (k >= 50) {
+      for (int i = 0; i < 100; ++i) {
+        const double column = right_columns[static_cast<size_t>(i)];
+        off_px += std::abs(captured.view->observation(i).right_x_px - column);
+        moved_off_px += std::abs(tracked.view->observation(i).right_x_px - column);
+      }
+    }
+    times.Follow(step);
+    times.Learn(tracked, Rigid3::Identity(), replica);
+  }
+  EXPECT_NEAR(times.right_delay_s(), kDelay_s, 0.0005);
+  EXPECT_LT(moved_off_px, 0.2 * off_px);
 }
 
 }  // namespace
