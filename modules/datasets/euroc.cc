@@ -1,6 +1,8 @@
 // EuRoC MAV sequences: mav0/cam0 and cam1 (sensor.yaml, data.csv, data/), and the pose of the body (IMU) in
 // mav0/state_groundtruth_estimate0/data.csv. T_BS of a sensor.yaml is body_from_sensor. The TUM visual-inertial
 // benchmark has the same folders without sensor.yaml (the calibration is that of Kalibr), and the truth in mocap0.
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 
@@ -11,6 +13,7 @@
 #include "datasets/pose_track.h"
 #include "datasets/recording.h"
 #include "datasets/text_file.h"
+#include "datasets/time_association.h"
 
 namespace tessera {
 namespace {
@@ -23,8 +26,16 @@ CameraOnBody ReadSensor(const fs::path& path) {
   return sensor;
 }
 
-// Image files of a camera by time, nanoseconds. Throws InputError if one does not exist.
-std::map<int64_t, std::string> ReadImageTable(const fs::path& camera_folder) {
+constexpr int64_t kMaxPairGapNs = 20'000'000;
+
+// Image files of a camera, in the order of their times.
+struct ImageTable {
+  std::vector<int64_t> times_ns;
+  std::vector<std::string> paths;
+};
+
+// Throws InputError if a file does not exist. Of two of one time, the first counts.
+ImageTable ReadImageTable(const fs::path& camera_folder) {
   std::map<int64_t, std::string> images;
   for (const TextRow& row : ReadRows(camera_folder / "data.csv")) {
     const int64_t time_ns = row.TimeNs(0);
@@ -36,7 +47,12 @@ std::map<int64_t, std::string> ReadImageTable(const fs::path& camera_folder) {
     }
     images.emplace(time_ns, path);
   }
-  return images;
+  ImageTable table;
+  for (const auto& [time_ns, path] : images) {
+    table.times_ns.push_back(time_ns);
+    table.paths.push_back(path);
+  }
+  return table;
 }
 
 // Rows: time [ns], position x y z [m], rotation w x y z; velocities and biases may follow.
@@ -53,33 +69,40 @@ PoseTrack ReadBodyTrack(const fs::path& path) {
   return world_from_body;
 }
 
-// Images that both cameras took at the same moment; all of the left one's for mono.
+// Images that both cameras took, all of the left one's for mono. Cameras that aren't triggered together take them some
+// milliseconds apart, which the tracker corrects.
 std::vector<int64_t> OpenImages(const fs::path& mav, SensorType sensor, Recording& recording) {
-  const std::map<int64_t, std::string> left = ReadImageTable(mav / "cam0");
+  const ImageTable left = ReadImageTable(mav / "cam0");
   const bool is_stereo = sensor == SensorType::kStereo;
-  const std::map<int64_t, std::string> right =
-      is_stereo ? ReadImageTable(mav / "cam1") : std::map<int64_t, std::string>();
+  const ImageTable right = is_stereo ? ReadImageTable(mav / "cam1") : ImageTable{};
+  const std::vector<int64_t> right_of_left = AssociateTimes(left.times_ns, right.times_ns, kMaxPairGapNs);
   std::vector<int64_t> times_ns;
   std::vector<std::string> left_paths, right_paths;
-  for (const auto& [time_ns, path] : left) {
-    const auto match = right.find(time_ns);
-    if (is_stereo && match == right.end()) {
-      continue;
-    }
+  int64_t widest_gap_ns = 0;
+  for (size_t i = 0; i < left.times_ns.size(); ++i) {
+    const int64_t time_ns = left.times_ns[i], j = right_of_left[i];
+    if (is_stereo && j < 0) continue;
     times_ns.push_back(time_ns);
     recording.utimes_us.push_back(time_ns / 1000);
-    left_paths.push_back(path);
+    left_paths.push_back(left.paths[i]);
     if (is_stereo) {
-      right_paths.push_back(match->second);
+      right_paths.push_back(right.paths[static_cast<size_t>(j)]);
+      widest_gap_ns = std::max(widest_gap_ns, std::abs(right.times_ns[static_cast<size_t>(j)] - time_ns));
     }
   }
   if (times_ns.empty()) {
-    throw InputError("folder " + mav.string() + ": no image of cam0 has the time of one of cam1: use --sensor mono");
+    throw InputError("folder " + mav.string() +
+                     ": no image of cam0 was taken within 20 ms of one of cam1: use --sensor mono");
   }
-  const size_t num_single = left.size() + right.size() - left_paths.size() - right_paths.size();
+  const size_t num_single = left.paths.size() + right.paths.size() - left_paths.size() - right_paths.size();
   if (num_single > 0) {
     recording.notes.push_back(std::to_string(num_single) +
                               " images without a partner in the other camera are skipped.");
+  }
+  if (widest_gap_ns > 0) {
+    recording.notes.push_back("The two images of a pair are up to " +
+                              std::to_string((widest_gap_ns + 999'999) / 1'000'000) +
+                              " ms apart: trigger the cameras together.");
   }
   recording.left = ReadImageFiles(std::move(left_paths));
   recording.right = is_stereo ? ReadImageFiles(std::move(right_paths)) : nullptr;

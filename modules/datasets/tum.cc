@@ -21,6 +21,7 @@
 #include "datasets/readme_calibration.h"
 #include "datasets/recording.h"
 #include "datasets/text_file.h"
+#include "datasets/time_association.h"
 
 namespace tessera {
 namespace {
@@ -52,29 +53,10 @@ std::vector<TimedFile> ReadFileTable(const fs::path& folder, const std::string& 
   return files;
 }
 
-// Index of the file nearest in time (the earlier of two as near) in the non-empty, ordered list.
-size_t Nearest(const std::vector<TimedFile>& files, int64_t utime_us) {
-  const auto after = std::lower_bound(files.begin(), files.end(), utime_us,
-                                      [](const TimedFile& file, int64_t time) { return file.utime_us < time; });
-  if (after == files.begin()) {
-    return 0;
-  }
-  const auto before = std::prev(after);
-  const bool take_before = after == files.end() || utime_us - before->utime_us <= after->utime_us - utime_us;
-  return static_cast<size_t>((take_before ? before : after) - files.begin());
-}
-
-// By color image, the depth image that belongs to it, or -1: the two are each other's nearest and at most kMaxPairGapUs
-// apart; so none is used twice.
-std::vector<int64_t> Associate(const std::vector<TimedFile>& color, const std::vector<TimedFile>& depth) {
-  std::vector<int64_t> depth_of_color;
-  for (size_t i = 0; i < color.size(); ++i) {
-    const size_t j = Nearest(depth, color[i].utime_us);
-    const int64_t gap_us = std::abs(depth[j].utime_us - color[i].utime_us);
-    const bool is_pair = gap_us <= kMaxPairGapUs && Nearest(color, depth[j].utime_us) == i;
-    depth_of_color.push_back(is_pair ? static_cast<int64_t>(j) : -1);
-  }
-  return depth_of_color;
+std::vector<int64_t> TimesOf(const std::vector<TimedFile>& files) {
+  std::vector<int64_t> utimes_us;
+  for (const TimedFile& file : files) utimes_us.push_back(file.utime_us);
+  return utimes_us;
 }
 
 void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording) {
@@ -89,7 +71,7 @@ void OpenImages(const fs::path& folder, SensorType sensor, Recording& recording)
     return;
   }
   const std::vector<TimedFile> depth = ReadFileTable(folder, "depth.txt");
-  const std::vector<int64_t> depth_of_color = Associate(color, depth);
+  const std::vector<int64_t> depth_of_color = AssociateTimes(TimesOf(color), TimesOf(depth), kMaxPairGapUs);
   const auto num_alone = std::count(depth_of_color.begin(), depth_of_color.end(), -1);
   if (num_alone == std::ssize(color)) {
     throw InputError("folder " + folder.string() +

@@ -38,7 +38,7 @@ class EurocTest : public testing::Test {
   }
 
   void WriteCamera(const std::string& camera, const Rigid3& body_from_sensor, const std::vector<int>& frames,
-                   const std::string& distortion) {
+                   const std::string& distortion, int64_t later_ns = 0) {
     const Eigen::Matrix<double, 3, 4> m = body_from_sensor.Matrix();
     std::string transform;
     for (int i = 0; i < 12; ++i) {
@@ -54,7 +54,7 @@ class EurocTest : public testing::Test {
                       (distortion.empty() ? "-0.2, 0.05, 0.0002, 0.0001" : distortion) + "]\n");
     std::string rows = "#timestamp [ns],filename\r\n";
     for (const int frame : frames) {
-      const std::string name = std::to_string(kStartNs + frame * kFrameNs);
+      const std::string name = std::to_string(kStartNs + frame * kFrameNs + later_ns);
       rows += name + "," + name + ".png\r\n";
       folder_.WriteImage("mav0/" + camera + "/data/" + name + ".png", DatasetFolder::Pattern(80, 60, frame));
     }
@@ -78,6 +78,16 @@ class EurocTest : public testing::Test {
   DatasetFolder folder_;
   Rigid3 body_from_left_, body_from_right_;
 };
+
+TEST_F(EurocTest, CamerasThatArentTriggeredTogetherMakePairsOfImagesThatAreNear) {
+  std::filesystem::remove_all(folder_.path("mav0/cam1"));
+  WriteCamera("cam1", body_from_right_, {0, 2, 3}, "", 6'400'000);
+  const auto source = OpenSource(Options(SensorType::kStereo));
+  for (const int frame : {0, 2, 3}) EXPECT_EQ(source->Next()->utime_us, (kStartNs + frame * kFrameNs) / 1000);
+  EXPECT_FALSE(source->Next());
+  ASSERT_EQ(source->notes().size(), 2U);
+  EXPECT_NE(source->notes()[1].find("up to 7 ms apart"), std::string::npos);
+}
 
 TEST_F(EurocTest, StereoTakesFramesThatBothCamerasHave) {
   const auto source = OpenSource(Options(SensorType::kStereo));
