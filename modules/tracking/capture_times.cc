@@ -1,6 +1,5 @@
 #include "tracking/capture_times.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -11,10 +10,9 @@
 namespace tessera {
 namespace {
 
-// Of two frames, for their poses to tell how the camera moved while an image was read or depths were measured, ...
-constexpr double kMaxFrameInterval_s = 0.07;
-// ... and while it waited for the right camera: less accurate, but better than not at all.
-constexpr double kMaxPairInterval_s = 0.15;
+// Of two frames, for their poses to tell how the camera moved while an image was read or depths were measured; while it
+// waited for the right camera: less accurate, but better than not at all.
+constexpr double kMaxFrameInterval_s = 0.07, kMaxPairInterval_s = 0.15;
 constexpr double kMinDelay_s = 0.001;  // of depths: in less, a turn moves an image by less than a pixel
 
 }  // namespace
@@ -47,8 +45,7 @@ void CaptureTimes::Learn(const TrackedFrame& tracked, const Rigid3& world_from_r
   if (!motion_) return;
   const CameraMotion& motion = motion_->motion;
   right_delay_.Add(tracked, motion, replica);
-  if (!motion_at_reference_) return;
-  if (std::max(motion_->interval_s, motion_at_reference_->interval_s) > kMaxFrameInterval_s) return;
+  if (!motion_at_reference_ || !motion_->is_fine() || !motion_at_reference_->is_fine()) return;
   const MovingView reference{world_from_reference, motion_at_reference_->motion};
   readout_.Add(tracked, motion, reference);
   depth_delay_.Add(tracked, motion, reference);
@@ -66,6 +63,8 @@ void CaptureTimes::ForgetMotion() {
   right_delay_.ForgetMotion();
 }
 
+bool CaptureTimes::KnownMotion::is_fine() const { return interval_s <= kMaxFrameInterval_s; }
+
 std::optional<CaptureTimes::KnownMotion> CaptureTimes::MeanMotion(const std::optional<Step>& step) {
   if (!step || step->interval_s > kMaxPairInterval_s) return std::nullopt;
   return KnownMotion{MotionOver(step->last_from_current, step->interval_s), step->interval_s};
@@ -74,7 +73,7 @@ std::optional<CaptureTimes::KnownMotion> CaptureTimes::MeanMotion(const std::opt
 // The mean motion is that of half an interval ago.
 std::optional<CaptureTimes::KnownMotion> CaptureTimes::MotionAtEnd(const std::optional<Step>& step) const {
   std::optional<KnownMotion> known = MeanMotion(step);
-  if (!known || !mean_motion_) return known;
+  if (!known || !mean_motion_ || known->is_fine() != mean_motion_->is_fine()) return known;
   CameraMotion& motion = known->motion;
   motion.velocity += 0.5 * (motion.velocity - mean_motion_->motion.velocity);
   motion.turn_rate += 0.5 * (motion.turn_rate - mean_motion_->motion.turn_rate);
@@ -85,9 +84,8 @@ CaptureTimes::Frame CaptureTimes::Moved(const CapturedFrame& captured, const Tra
                                         const TrackedFrame& tracked, const std::optional<KnownMotion>& known) const {
   if (!known) return captured.view;
   const CameraMotion& motion = known->motion;
-  const bool is_known_well = known->interval_s <= kMaxFrameInterval_s;
-  const bool is_rolling = is_known_well && readout().is_rolling();
-  const bool has_late_depths = is_known_well && captured.depth_delay_s != 0.0;
+  const bool is_rolling = known->is_fine() && readout().is_rolling();
+  const bool has_late_depths = known->is_fine() && captured.depth_delay_s != 0.0;
   const double right_delay_s = this->right_delay_s();
   if (!is_rolling && !has_late_depths && right_delay_s == 0.0) return captured.view;
   FeatureFrame features = captured.view->features();

@@ -61,6 +61,8 @@ class CaptureTimes {
   struct KnownMotion {
     CameraMotion motion;  // in units of the world
     double interval_s = 0.0;
+
+    bool is_fine() const;  // tells how the camera moved while an image was read or depths were measured
   };
 
   static std::optional<KnownMotion> MeanMotion(const std::optional<Step>& step);
