@@ -4,7 +4,7 @@
 
 #include "geometry/reprojection.h"
 #include "measurement/depth_delay.h"
-#include "measurement/landmark_description.h"
+#include "tracking/measured_points.h"
 
 namespace tessera {
 namespace {
@@ -31,16 +31,11 @@ TimeOffsetEquations EquationsOf(const TrackedFrame& frame, const CameraMotion& m
   const Rigid3 frame_from_world = frame.world_from_camera.Inverse();
   const Rigid3 frame_from_reference = frame_from_world * reference.world_from_camera;
   const Rigid3 reference_from_frame = frame_from_reference.Inverse();
-  const int step = 1 + frame.NumPoints() / kMaxPoints;
-  int num_seen = 0;
-  for (int i = 0; i < frame.view->size(); ++i) {
-    const SeenPoint& seen = frame.points[Index(i)];
-    if (!seen.valid() || num_seen++ % step != 0) continue;
-    if (!HasDepth(seen.landmark, frame.world_from_camera.translation)) continue;
+  for (const int i : MeasuredPoints(frame, kMaxPoints)) {
     const PixelObservation observation = frame.view->observation(i);
-    const Eigen::Vector3d point = frame_from_world * seen.landmark.position_in_world;
+    const Eigen::Vector3d point = frame_from_world * frame.points[Index(i)].landmark.position_in_world;
     const Eigen::Vector3d in_reference = reference_from_frame * point;
-    if (!observation.has_right() || point.z() < kMinDepth || in_reference.z() < kMinDepth) continue;
+    if (in_reference.z() < kMinDepth) continue;
     const std::optional<Eigen::Vector3d> surface = SurfaceAt(*frame.view, i);
     if (!surface) continue;
     const double rate = InverseDepthRate(*surface, camera.Ray(observation.pixel_px), motion);

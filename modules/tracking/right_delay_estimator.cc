@@ -7,8 +7,8 @@
 #include <iterator>
 
 #include "geometry/reprojection.h"
-#include "measurement/landmark_description.h"
 #include "measurement/right_delay.h"
+#include "tracking/measured_points.h"
 
 namespace tessera {
 namespace {
@@ -20,8 +20,8 @@ constexpr int kMinFrames = 20;         // that have to tell it
 constexpr double kMapShare = 0.7;      // m; with 1 delays come out too short, and with 0 too long
 // Of what one frame says of the delay: its motion isn't known exactly, nor is the map.
 constexpr double kFrameSigma_s = 0.003;
-constexpr double kForgotten =
-    0.05;  // by each frame, of what the ones before said: the first had a map that was distorted
+// By each frame, of what the ones before said: the first had a map that was distorted.
+constexpr double kForgotten = 0.05;
 // What is usual: of the delay, and of what is left of a squint and a twist, at half the height of the image.
 constexpr double kDelaySigma_s = 0.01, kShiftSigma_px = 0.5;
 constexpr int kMinPoints = 50;
@@ -68,8 +68,9 @@ std::optional<RightDelayEstimator::Shift> RightDelayEstimator::ShiftOf(const See
   double weight = 0.0;
   const auto add = [&](KeyframeId id) {
     const auto taken = keyframes_.find(id);
+    if (taken == keyframes_.end() || !taken->second.motion) return;
     const std::optional<Sim3> world_from_keyframe = replica.WorldFromKeyframe(id);
-    if (taken == keyframes_.end() || !taken->second.motion || !world_from_keyframe) return;
+    if (!world_from_keyframe) return;
     const Rigid3 world_from_camera = world_from_keyframe->Pose();
     const Eigen::Vector3d point = world_from_camera.Inverse() * seen.landmark.position_in_world;
     if (point.z() < kMinDepth) return;
@@ -97,15 +98,11 @@ std::optional<RightDelayEstimator::Equations> RightDelayEstimator::EquationsOf(c
   Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();  // of p, d, c, e
   Eigen::Matrix<double, 9, 1> right_side = Eigen::Matrix<double, 9, 1>::Zero();
   double sum_of_squares = 0.0;
-  const int step = 1 + frame.NumPoints() / kMaxPoints;
-  int num_seen = 0, num_points = 0;
-  for (int i = 0; i < frame.view->size(); ++i) {
+  int num_points = 0;
+  for (const int i : MeasuredPoints(frame, kMaxPoints)) {
     const SeenPoint& seen = frame.points[Index(i)];
-    if (!seen.valid() || num_seen++ % step != 0) continue;
-    if (!HasDepth(seen.landmark, frame.world_from_camera.translation)) continue;
     const PixelObservation observation = frame.view->observation(i);
     const Eigen::Vector3d point = frame_from_world * seen.landmark.position_in_world;
-    if (!observation.has_right() || point.z() < kMinDepth) continue;
     const std::optional<Shift> shift = ShiftOf(seen, camera, replica);
     if (!shift) continue;
     const Reprojection reprojection = Reproject(camera, frame.view->baseline_m(), point, observation);
