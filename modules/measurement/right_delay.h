@@ -13,9 +13,9 @@ namespace tessera {
 double RightColumnRate(const CameraCalibration& camera, const Eigen::Vector3d& point_in_left,
                        const CameraMotion& motion);
 
-// The features with the right columns of their own time, when those that they have were seen `delay_s` later (< 0:
-// before). The depth of a keypoint is where its ray meets the column's plane of rays of the right camera at its time:
-// with ray r, w = 1 / depth, later_from_now = (R, t) and the column m on the right camera's plane z = 1,
+// The features with the columns that the right camera would have seen at their time, from those that it saw `delay_s`
+// later (< 0: before). The depth of a keypoint is where its ray meets the column's plane of rays of the right camera at
+// its time: with ray r, w = 1 / depth, later_from_now = (R, t) and the column m on the right camera's plane z = 1,
 //
 //   (a - w c) ~ (m, ., 1),    a = R r,  c = (baseline, 0, 0) - t    =>    w = (a_x - m a_z) / (c_x - m c_z)
 //

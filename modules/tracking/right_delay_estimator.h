@@ -47,8 +47,8 @@ class RightDelayEstimator {
     double delay_s = 0.0;
   };
 
-  // Of the map's point, as above: by how much it is moved by each second of delay, and by what was taken out; m in the
-  // world. nullopt: nothing is known of who sees it.
+  // Of the map's point, as above: by how much it is moved by each second of delay, and by what was taken out; meters,
+  // in the world. nullopt: nothing is known of who sees it.
   struct Shift {
     Eigen::Vector3d by_delay = Eigen::Vector3d::Zero(), taken_out = Eigen::Vector3d::Zero();
   };

@@ -132,15 +132,17 @@ def _readout(result: Result) -> str:
             way = "" if down_ms > 0 else " from the bottom up"
         found.append(f"the camera takes {abs(down_ms or across_ms):.0f} ms to read an image{way} (a rolling shutter)")
     if delay_ms:
-        when = "after" if delay_ms > 0 else "before"
-        found.append(f"depths are measured {abs(delay_ms):.0f} ms {when} the time they are said to be of")
+        found.append(f"depths are measured {abs(delay_ms):.0f} ms {_after(delay_ms)} the time they are said to be of")
     if right_ms:
-        when = "after" if right_ms > 0 else "before"
-        found.append(f"the right camera takes its image {abs(right_ms):.1f} ms {when} the left one")
+        found.append(f"the right camera takes its image {abs(right_ms):.1f} ms {_after(right_ms)} the left one")
     if not found:
         return ""
     sentence = " and ".join(found)
     return f"{sentence[0].upper()}{sentence[1:]}; keypoints were corrected for it."
+
+
+def _after(delay_ms: float) -> str:
+    return "after" if delay_ms > 0 else "before"
 
 
 def _own_body(result: Result) -> str:
