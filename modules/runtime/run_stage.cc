@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <climits>
 #include <csignal>
@@ -34,6 +35,7 @@ struct Arguments {
   std::vector<std::string> assignments;
   std::string name;
   int id = 0;
+  bool is_held = false;
 };
 
 // The arguments; an exit status if the process is to end at once.
@@ -46,6 +48,9 @@ std::optional<int> ParseArguments(const std::string& description, int argc, char
   app.add_option("--name", arguments->name, "name of this process on the bus");
   app.add_option("--id", arguments->id, "number of this extractor: it gets its jobs on TILE_<id>")
       ->check(CLI::Range(0, kMaxExtractors - 1));
+  app.add_flag(
+      "--held", arguments->is_held,
+      "begin to work when the standard input ends: who started this process says so when all others are ready");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -122,8 +127,9 @@ StageEngine::Setup MakeSetup(const Arguments& arguments) {
 }
 
 // Sleeps until a message waits or something is due, and at most a tenth of a second: signals are looked at then.
-void Wait(const StageEngine& engine) {
-  std::vector<pollfd> descriptors;
+// `other_descriptor`: that wakes it, too; -1: none.
+void Wait(const StageEngine& engine, int other_descriptor = -1) {
+  std::vector<pollfd> descriptors{{other_descriptor, POLLIN, 0}};
   for (const auto& bus : engine.buses()) {
     if (bus->file_descriptor() >= 0) descriptors.push_back({bus->file_descriptor(), POLLIN, 0});
   }
@@ -136,6 +142,20 @@ void RunFor(StageEngine& engine, int64_t duration_us) {
   const int64_t end_us = engine.clock_->NowUs() + duration_us;
   while (engine.clock_->NowUs() < end_us && !engine.stopped_) {
     if (!engine.Step()) Wait(engine);
+  }
+}
+
+bool HasInputEnded() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  if (poll(&input, 1, 0) <= 0) return false;
+  std::array<char, 256> ignored;
+  return read(STDIN_FILENO, ignored.data(), ignored.size()) <= 0;
+}
+
+// Its heartbeats go on meanwhile.
+void AwaitRelease(StageEngine& engine) {
+  while (!told_to_stop && !engine.stopped_ && !HasInputEnded()) {
+    if (!engine.Step()) Wait(engine, STDIN_FILENO);
   }
 }
 
@@ -172,8 +192,9 @@ int Live(const std::string& program, const Arguments& arguments,
   spdlog::info("{} {}", program, kVersion);
   const int64_t two_heartbeats_us = 2 * engine.stream_settings_.heartbeat_us;
   if (CanListenAnywhere(engine)) RunFor(engine, two_heartbeats_us);  // hear of other processes
+  if (arguments.is_held) AwaitRelease(engine);
   std::shared_ptr<void> stage;
-  if (!engine.stopped_) {
+  if (!engine.stopped_ && !told_to_stop) {
     stage = make_stage(engine.context());
     engine.BeginToRun();  // at once, for those that wait for it to run
     RunUntilStopped(engine);

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import lcm
+
 from tessera_cli.files import python_command
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,6 +42,14 @@ def wait_for(condition: Callable[[], object], what: str, timeout_s: float = RUN_
     while not condition():
         assert time.monotonic() < deadline, f"waited in vain for {what}"
         time.sleep(0.02)
+
+
+def wait_for_a_pose(port: int) -> None:
+    """Of the stack on this port: its camera and all others are at work."""
+    poses: list[bytes] = []
+    bus = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
+    bus.subscribe("POSE", lambda _channel, data: poses.append(data))
+    wait_for(lambda: (bus.handle_timeout(20), poses)[1], "a pose")
 
 
 def read_line(process: "subprocess.Popen[str]") -> str:

@@ -14,7 +14,18 @@ from pathlib import Path
 import lcm
 import pytest
 
-from helpers.stack import NUM_FRAMES, ROOT, RUN_TIMEOUT_S, Finished, Tessera, pids_of, read_line, wait_for
+from helpers.stack import (
+    NUM_FRAMES,
+    ROOT,
+    RUN_TIMEOUT_S,
+    Finished,
+    Tessera,
+    pids_of,
+    read_line,
+    wait_for,
+    wait_for_a_pose,
+)
+from tessera_cli.files import BIN
 from tessera_cli.lcm_bus import LoggedEvent, read_log, write_log
 from tessera_cli.messages import pose_t, receive_logged
 
@@ -339,10 +350,22 @@ def test_an_interrupted_run_writes_what_it_has(tessera: Tessera, sequence: Path,
     assert not pids_of(folder)
 
 
+def test_a_camera_that_is_held_opens_nothing_before_its_input_ends(tessera: Tessera) -> None:
+    url = f"bus.main_url=udpm://239.255.76.67:{tessera.next_port()}?ttl=0"
+    line = [str(BIN / "tessera-camera"), "--held", "--set", "camera.source=kitti:/no/such/folder", "--set", url]
+    camera = subprocess.Popen(line, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert camera.stdin is not None and camera.stderr is not None
+    assert "tessera-camera" in camera.stderr.readline()
+    time.sleep(0.5)
+    assert camera.poll() is None
+    camera.stdin.close()
+    assert "/no/such/folder" in camera.stderr.read() and camera.wait(RUN_TIMEOUT_S) == 2
+
+
 def test_no_stage_outlives_a_killed_launcher(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     run = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
-    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    wait_for_a_pose(port)
     run.kill()
     run.wait()
     wait_for(lambda: not pids_of(folder), "the end of all stages", timeout_s=10)
@@ -351,7 +374,7 @@ def test_no_stage_outlives_a_killed_launcher(tessera: Tessera, sequence: Path) -
 def test_a_second_stack_on_the_same_port_is_refused(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     first = tessera.start("run", f"kitti:{sequence}", "--pace", "0.1", "--port", port, "--out", folder)
-    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    wait_for_a_pose(port)
     second = tessera.command(
         "run", f"kitti:{sequence}", "--port", port, "--out", tessera.next_folder().with_name("second")
     )
@@ -365,7 +388,7 @@ def test_a_second_stack_on_the_same_port_is_refused(tessera: Tessera, sequence: 
 def test_a_second_run_into_the_same_folder_is_refused_and_the_first_goes_on(tessera: Tessera, sequence: Path) -> None:
     port, folder = tessera.next_port(), tessera.next_folder()
     first = tessera.start("run", f"kitti:{sequence}", "--port", port, "--out", folder)
-    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    wait_for_a_pose(port)
     second = tessera.command("run", f"kitti:{sequence}", "--port", tessera.next_port(), "--out", folder)
     assert second.status == 2 and f"another run writes into {folder}" in second.err, second.out + second.err
     out, _ = first.communicate(timeout=RUN_TIMEOUT_S)
@@ -484,7 +507,7 @@ def test_random_bytes_on_every_channel_are_counted_and_change_nothing(
     run = tessera.start(
         "run", f"kitti:{sequence}", "--extractors", 2, "--tiles", "2x2", "--port", port, "--out", folder
     )
-    wait_for(lambda: pids_of(folder, "camera"), "the camera")
+    wait_for_a_pose(port)
     publish_noise(port, random.Random(1))
     out, _ = run.communicate(timeout=RUN_TIMEOUT_S)
     assert run.returncode == 0, out

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from helpers.attacker import ATTACKS, Attacker
 from helpers.nodes import FIRST_NODE_PORT, MakeNode
-from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera, environment, pids_of, wait_for
+from helpers.stack import ROOT, RUN_TIMEOUT_S, Finished, Tessera, environment, wait_for_a_pose
 from tessera_cli.experiments.distribution.lan import Lan
 from tessera_cli.lcm_bus import bus_url
 from tessera_cli.membership import run_dir_of
@@ -85,7 +85,7 @@ def test_a_member_that_asks_without_end_and_tells_nonsense_stalls_nobody(
     words = ("run", f"kitti:{sequence}", "--extractors", 1, "--pace", "0.5", "--port", port, "--out", folder)
     run = tessera.start(*words)
     try:
-        wait_for(lambda: pids_of(folder, "camera"), "the camera")
+        wait_for_a_pose(port)
         secret = run_dir_of(own_keys, bus_url(port), "").secret()
         assert secret is not None
         attacker = Attacker(port, secret=secret)

@@ -52,7 +52,8 @@ class ScriptWatcher:
             usage.cpu_s = max(usage.cpu_s, process.cpu_s)
             usage.max_rss_mb = max(usage.max_rss_mb, process.rss_mb)
             usage.reason = process.reason
-            if process.command == "camera" and self._camera_at is None:
+            is_at_work = process.state != procman_process_t.WAITING
+            if process.command == "camera" and is_at_work and self._camera_at is None:
                 self._camera_at = time.monotonic() - process.up_s
             if process.command == "evaluator" and process.state == procman_process_t.FINISHED:
                 self._evaluator = status

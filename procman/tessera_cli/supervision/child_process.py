@@ -22,6 +22,7 @@ class Launch:
     """What is executed. A process is restarted when it is wanted with another Launch than it runs with."""
 
     words: tuple[str, ...]  # program and arguments
+    held: str  # the argument that makes it wait until its input ends; empty: it can't be held
     folder: Path
     environment: tuple[tuple[str, str], ...]
     command: str
@@ -55,15 +56,18 @@ def _prepare(parent: int, options: RunOptions) -> None:
 class ChildProcess:
     """A process, from its start to the end of the last of its descendants."""
 
-    def __init__(self, launch: Launch, mark: str) -> None:
-        """Raises OSError or subprocess.SubprocessError (a nice value or CPU that the kernel refuses)."""
+    def __init__(self, launch: Launch, mark: str, is_held: bool = False) -> None:
+        """`is_held`: it prepares itself, and works from `release` on.
+
+        Raises OSError or subprocess.SubprocessError (a nice value or CPU that the kernel refuses).
+        """
         parent = os.getpid()
         self._mark = mark
         self._popen = subprocess.Popen(
-            launch.words,
+            [*launch.words, *([launch.held] if is_held else [])],
             cwd=launch.folder,
             env={**os.environ, **dict(launch.environment), MARK: mark},
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if is_held else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             start_new_session=True,
@@ -77,6 +81,14 @@ class ChildProcess:
         self.cpu_s = 0.0  # of itself and of descendants that it waited for; known when it has ended
         self.max_rss_mb = 0.0  # its own peak, 10^6 bytes
         self._status: int | None = None
+
+    @property
+    def is_held(self) -> bool:
+        return self._popen.stdin is not None and not self._popen.stdin.closed
+
+    def release(self) -> None:
+        if self._popen.stdin is not None:
+            self._popen.stdin.close()
 
     def fileno(self) -> int:
         return self._output.fileno()
@@ -131,4 +143,5 @@ class ChildProcess:
             self._wait(0)
 
     def close(self) -> None:
+        self.release()
         self._output.close()

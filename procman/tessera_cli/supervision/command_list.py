@@ -1,7 +1,8 @@
 """A deputy's own list of what it executes: orders select from it by name, and nothing else is ever executed.
 
 It has the grammar of process lists, with other attributes: exec (the program and its arguments), folder,
-environment, and writes (folders in which the settings of orders may let processes write, besides the run's own).
+environment, writes (folders in which the settings of orders may let processes write, besides the run's own), and held
+(the argument with which the program prepares itself and begins when its standard input ends).
 In exec, ${bin}, ${settings}, ${name} and ${id} stand for the folder of the built programs, the run's file of settings,
 and the process's name and number. Words are split before they are filled in, so that no value becomes two arguments.
 """
@@ -31,6 +32,7 @@ class LocalCommand:
     folder: Path  # working folder
     environment: dict[str, str] = field(default_factory=dict)  # added to the deputy's own
     writes: tuple[Path, ...] = ()  # folders in which an order's settings may let it write (write_limits.py)
+    held: str = ""  # the argument that makes it wait until its input ends; empty: it can't
 
     def fill(self, values: dict[str, str]) -> list[str]:
         """The words to execute. `values`: of all placeholders."""
@@ -57,7 +59,13 @@ def _read_command(block: Block, folder: Path) -> LocalCommand:
     if block.kind != "cmd":
         raise block.place.error(f"a command list holds only cmd, not '{block.kind}'.")
     refuse([*block.blocks, *block.steps], 'a cmd holds only attributes such as exec = "PROGRAM ARGUMENTS";.')
-    readers = {"exec": _read_words, "folder": _read_folder, "environment": _read_environment, "writes": _read_folders}
+    readers = {
+        "exec": _read_words,
+        "folder": _read_folder,
+        "environment": _read_environment,
+        "writes": _read_folders,
+        "held": _read_argument,
+    }
     values = read_attributes(block, readers)
     if "exec" not in values:
         raise block.place.error(f'cmd "{block.name}" has no exec.')
@@ -73,6 +81,12 @@ def _read_words(text: str) -> tuple[str, ...]:
         if name not in PLACEHOLDERS:
             raise ValueError(f"has an unknown ${{{name}}}; known: {', '.join(PLACEHOLDERS)}")
     return words
+
+
+def _read_argument(text: str) -> str:
+    if not re.fullmatch(r"-[\w-]+", text):
+        raise ValueError("must be one argument such as --held")
+    return text
 
 
 def _read_folder(text: str) -> Path:

@@ -2,7 +2,8 @@
 
 `step` compares what is wanted with what runs and does the next thing. All times are monotonic seconds.
 
-  WAITING -> STARTING -> READY -> FINISHED         as its stage reports on STATUS
+  WAITING -> STARTING -> READY -> FINISHED         as its stage reports on STATUS; one that can be held already runs
+                                                   while it waits, and prepares itself
   any of these -> BACKING_OFF -> STARTING          it failed and is restarted
                -> ENDED, FAILED                    it ended by itself, or failed and is not restarted
                -> STOPPING -> STOPPED or WAITING   it is no longer wanted, or wanted with another Launch
@@ -118,8 +119,11 @@ class SupervisedProcess:
         may_descendants_end = self._kill_at is not None and now < self._kill_at and self.child.has_descendants()
         if status is not None and not may_descendants_end:
             self._on_exit(self.child, status, now)
-        elif self.wanted != self._running or self._kill_at is not None:
+        elif self.wanted is None or self.wanted != self._running or self._kill_at is not None:
             self._stop(self.child, now, has_dependents)
+        elif self.child.is_held:
+            if not self._must_wait(self.wanted, is_not_ready):
+                self._release(self.child, now)
         elif status is None:
             self._watch(self.child, now)
 
@@ -128,24 +132,37 @@ class SupervisedProcess:
             return
         if self.state == states.BACKING_OFF and now < self._due_at:
             return
-        if missing := [name for name in self.wanted.depends if is_not_ready(name)]:
-            self.state, self.reason = states.WAITING, f"waits for {', '.join(missing)}"
-            return
-        self._start(self.wanted, now)
+        must_wait = self._must_wait(self.wanted, is_not_ready)
+        if not must_wait or self.wanted.held:
+            self._start(self.wanted, now, is_held=must_wait)
 
-    def _start(self, launch: Launch, now: float) -> None:
+    def _must_wait(self, launch: Launch, is_not_ready: Callable[[str], bool]) -> bool:
+        if missing := [name for name in launch.depends if is_not_ready(name)]:
+            self.state, self.reason = states.WAITING, f"waits for {', '.join(missing)}"
+        return bool(missing)
+
+    def _start(self, launch: Launch, now: float, is_held: bool) -> None:
         self._kill_reason, self._kill_at, self._last_line, self.last_exit = "", None, b"", None
-        if self.state == states.WAITING:
-            self.reason = ""  # after a failure it keeps telling why the process was restarted
         try:
-            self.child = ChildProcess(launch, self.mark)
+            self.child = ChildProcess(launch, self.mark, is_held)
         except (OSError, subprocess.SubprocessError) as error:
             self.state, self.reason = states.FAILED, f"can't be started: {error}"
             return
         self._running = launch
         self.num_starts += 1
-        self.started_at = self._heard_at = now
+        self.started_at = now
+        if not is_held:
+            self._begin(now)
+
+    def _release(self, child: ChildProcess, now: float) -> None:
+        child.release()
+        self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        if self.state == states.WAITING:
+            self.reason = ""  # after a failure it keeps telling why the process was restarted
         self.state = states.STARTING
+        self.started_at = self._heard_at = now
 
     def _watch(self, child: ChildProcess, now: float) -> None:
         assert self._running is not None

@@ -117,8 +117,9 @@ class Supervisor:
         if now - self._usage_at >= USAGE_PERIOD_S:
             self._usage_at = now
             self._measure(now)
-        # A process that has finished its work no longer needs the others.
-        working = [p for p in self._processes.values() if p.child and p.state != procman_process_t.FINISHED]
+        # A process that has finished its work, or not begun it, doesn't need the others.
+        idle = (procman_process_t.FINISHED, procman_process_t.WAITING)
+        working = [p for p in self._processes.values() if p.child and p.state not in idle]
         needed = {name for process in working for name in process.depends}
         for process in self._processes.values():
             process.step(now, self._is_not_ready, process.name in needed)

@@ -51,6 +51,7 @@ def to_launch(
     words = command.fill({**values, "name": wish.name, "id": str(wish.instance)})
     return Launch(
         words=tuple(words),
+        held=command.held,
         folder=command.folder,
         environment=tuple(command.environment.items()),
         command=wish.command,

@@ -15,6 +15,7 @@ import pytest
 
 from helpers.stack import ROOT, environment, read_line, wait_for
 from tessera_cli.errors import RunError, UserError
+from tessera_cli.messages import procman_process_t as states
 from tessera_cli.supervision.attributes import RunOptions
 from tessera_cli.supervision.child_process import ChildProcess, Launch
 from tessera_cli.supervision.command_list import read_command_list
@@ -33,6 +34,7 @@ cmd "refuser"  { exec = "sh -c 'echo tessera-camera: there is no folder X >&2; e
 cmd "faulty"   { exec = "sh -c 'echo the disk is missing; exit 3'"; }
 cmd "busy"     { exec = "sh -c 'while true; do true; done'"; }
 cmd "absent"   { exec = "/no/such/program"; }
+cmd "holdable" { exec = "sh -c 'echo prepared $1; cat; echo begun; exec sleep 1000' sh"; held = "--held"; }
 """
 STARTED = {"ready": "started", "auto_respawn": "never"}
 
@@ -145,6 +147,45 @@ def test_a_status_makes_ready_and_silence_is_a_hang(make_deputy: MakeDeputy) -> 
     assert deputy.warnings == ["stage sent no status for 0.3 s and was restarted."]
 
 
+def test_what_can_be_held_prepares_itself_while_it_waits(make_deputy: MakeDeputy) -> None:
+    deputy = make_deputy(process("sleeper", "stage", ready="status"), process("holdable", depends=("stage",)))
+    step_until(deputy, lambda: deputy.last_line("holdable") == "prepared --held", "its start")
+    time.sleep(0.5)
+    deputy.step()
+    held = deputy.processes[1]
+    assert (STATE_NAMES[held.state], held.reason) == ("waiting", "waits for stage")
+    assert deputy.last_line("holdable") == "prepared --held"
+    deputy.on_stage_reports([report(deputy, "stage", RUNNING)])
+    step_until(deputy, lambda: not deputy.not_ready, "its work")
+    assert deputy.last_line("holdable") == "begun" and held.num_starts == 1 and held.reason == ""
+
+
+def test_what_need_not_wait_is_not_held(make_deputy: MakeDeputy) -> None:
+    deputy = make_deputy(process("holdable"))
+    step_until(deputy, lambda: not deputy.not_ready, "its work")
+    assert deputy.last_line("holdable") == "begun"
+
+
+def test_what_is_killed_while_it_is_held_is_held_again(make_deputy: MakeDeputy) -> None:
+    deputy = make_deputy(
+        process("sleeper", "stage", ready="status"), process("holdable", depends=("stage",), auto_respawn="killed")
+    )
+    os.kill(pid_of(deputy, "holdable"), signal.SIGKILL)
+    step_until(deputy, lambda: deputy.num_restarts("holdable") == 1, "its return")
+    step_until(deputy, lambda: deputy.last_line("holdable") == "prepared --held", "its preparation")
+    assert deputy.not_ready == ["stage", "holdable"]
+    deputy.on_stage_reports([report(deputy, "stage", RUNNING)])
+    step_until(deputy, lambda: not deputy.not_ready, "its work")
+
+
+def test_nobody_is_needed_by_what_is_held(make_deputy: MakeDeputy) -> None:
+    deputy = make_deputy(process("sleeper", "stage", ready="status"), process("holdable", depends=("stage",)))
+    step_until(deputy, lambda: deputy.last_line("holdable") == "prepared --held", "its start")
+    deputy.request_stop(["stage"])
+    step_until(deputy, lambda: deputy.processes[0].state == states.STOPPED, "its end")
+    assert deputy.processes[1].child is not None
+
+
 def test_who_was_stopped_itself_takes_nobody_for_hung(make_deputy: MakeDeputy) -> None:
     deputy = make_deputy(process("sleeper", ready="status", hang_timeout_s=0.5))
     deputy.on_stage_reports([report(deputy, "sleeper", RUNNING)])
@@ -209,7 +250,7 @@ def test_processor_time_and_memory_add_up_over_lives(make_deputy: MakeDeputy) ->
 def test_peak_memory_is_the_process_own_and_not_what_the_deputy_had(tmp_path: Path) -> None:
     ballast = bytearray(b"x" * 100_000_000)
     child = ChildProcess(
-        Launch(("sleep", "0.3"), tmp_path, (), "sleeper", (), RunOptions(), "", 0), f"{tmp_path}/sleeper"
+        Launch(("sleep", "0.3"), "", tmp_path, (), "sleeper", (), RunOptions(), "", 0), f"{tmp_path}/sleeper"
     )
     wait_for(lambda: child.poll() is not None, "its end")
     child.close()

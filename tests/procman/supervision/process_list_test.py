@@ -22,6 +22,7 @@ def test_shipped_lists_use_commands_of_the_shipped_command_list(name: str) -> No
     shipped = read_process_list(ROOT / "procman" / name)
     commands = read_command_list(ROOT / "procman" / "commands.pmd")
     assert {process.command for process in shipped.processes.values()} <= set(commands)
+    assert [name for name, command in commands.items() if command.held] == ["camera"]
     assert set(shipped.processes["camera"].depends) == set(shipped.processes) - {"camera"}
     assert "run" in shipped.scripts
 
@@ -178,6 +179,7 @@ def test_values_never_become_arguments_of_their_own(tmp_path: Path) -> None:
         ('cmd "a" { exec = "run ${home}"; }', "1:11", "unknown ${home}"),
         ('cmd "a" { exec = "run \'x"; }', "1:11", "No closing quotation"),
         ('cmd "a" { exec = "run"; nice = 3; }', "1:25", "no attribute 'nice'"),
+        ('cmd "a" { exec = "run"; held = "--two words"; }', "1:25", "must be one argument"),
         ('group "a" { }', "1:1", "only cmd"),
     ],
 )
