@@ -113,16 +113,18 @@ void SetOption(const std::string& key, const std::string& value, SimulationOptio
                                                {"bumps", &options.bumps},
                                                {"squint", &options.squint},
                                                {"twist", &options.twist},
+                                               {"pitch", &options.pitch},
                                                {"stamp", &options.stamp}};
   if (const auto found = numbers.find(key); found != numbers.end()) {
     *found->second = number;
   } else if (key == "seed" && number >= 0.0 && number < 4294967296.0) {
     options.seed = static_cast<uint32_t>(number);
   } else {
-    throw InputError("sim: `" + key + "=" + value +
-                     "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
-                     "depth_delay (ms), right_delay (ms), stop (m), people, bumps, squint, twist, body, stamp, speed, "
-                     "noise, scale or path");
+    throw InputError(
+        "sim: `" + key + "=" + value +
+        "` is unknown or out of range: give seed, length (m), duration (s), readout (ms), "
+        "depth_delay (ms), right_delay (ms), stop (m), people, bumps, squint, twist, pitch, body, stamp, speed, "
+        "noise, scale or path");
   }
 }
 
@@ -145,8 +147,8 @@ Result<> SimulationOptions::Check() const {
   }
   if (!(body >= 0.0 && body <= 0.5)) return Failed("sim: body must be between 0 and 0.5 of the image's height");
   if (!(people >= 0.0 && people <= 8.0)) return Failed("sim: people must be between 0 and 8");
-  if (!(std::abs(squint) <= 2.0 && std::abs(twist) <= 2.0)) {
-    return Failed("sim: squint and twist must be between -2 and 2 degrees");
+  if (!(std::abs(squint) <= 2.0 && std::abs(twist) <= 2.0 && std::abs(pitch) <= 2.0)) {
+    return Failed("sim: squint, twist and pitch must be between -2 and 2 degrees");
   }
   if (!(bumps >= 0.0 && bumps <= 1.0)) return Failed("sim: bumps must be between 0 and 1");
   if (!(stamp == 0.0 || stamp == 1.0)) return Failed("sim: stamp must be 0 or 1");
@@ -287,7 +289,8 @@ void Simulation::RenderEye(double time_s, double right_m, Rendering& out) {
   // Half of such small angles is the vector part of a quaternion.
   constexpr double kHalfDegree = 0.00872664626;
   if (right_m > 0.0) {
-    const Eigen::Quaterniond turned(1.0, 0.0, -kHalfDegree * options_.squint, kHalfDegree * options_.twist);
+    const Eigen::Vector3d turn = kHalfDegree * Eigen::Vector3d(options_.pitch, -options_.squint, options_.twist);
+    const Eigen::Quaterniond turned(1.0, turn.x(), turn.y(), turn.z());
     left_from_eye.rotation = turned.normalized();
   }
   if (readout_s_ == 0.0) {

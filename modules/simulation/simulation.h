@@ -43,6 +43,7 @@ struct SimulationOptions {
   double bumps = 0.0;           // flight: how hard it is knocked three times; 0.3: by 45 degrees
   double squint = 0.0;          // stereo: degrees by which the right camera is turned inwards, which nobody is told
   double twist = 0.0;           // likewise about its optical axis
+  double pitch = 0.0;           // likewise upwards
   double stamp = 0.0;           // 1: the time is written into the image, as dashcams do
   std::string path;             // a drive along the poses of a KITTI file instead of through the town
 
