@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "datasets/changed_source.h"
 #include "datasets/remap_table.h"
 
 namespace tessera {
@@ -35,62 +36,46 @@ CameraCalibration Doubled(CameraCalibration camera) {
   return camera;
 }
 
-class DoubledSource : public FrameSource {
+std::string NoteOf(const CameraCalibration& original) {
+  return "the images are small (" + std::to_string(original.width_px) + "x" + std::to_string(original.height_px) +
+         " px): they are doubled (camera.min_focal_px)";
+}
+
+class DoubledSource : public ChangedSource {
  public:
-  explicit DoubledSource(std::unique_ptr<FrameSource> source)
-      : source_(std::move(source)),
-        calibration_(Doubled(source_->calibration())),
-        table_(std::make_shared<const RemapTable>(TableOf(source_->calibration()))),
-        notes_{"the images are small (" + std::to_string(source_->calibration().width_px) + "x" +
-               std::to_string(source_->calibration().height_px) + " px): they are doubled (camera.min_focal_px)"} {
-    TakeNotes();
-  }
+  DoubledSource(std::unique_ptr<FrameSource> original, std::string note)
+      : ChangedSource(std::move(original), std::move(note)),
+        calibration_(Doubled(source().calibration())),
+        table_(std::make_shared<const RemapTable>(TableOf(source().calibration()))) {}
 
   const CameraCalibration& calibration() const override { return calibration_; }
-  std::optional<int64_t> num_frames() const override { return source_->num_frames(); }
-  const std::vector<GroundTruthPose>& ground_truth() const override { return source_->ground_truth(); }
-  std::optional<CameraFrame> Next() override {
-    std::optional<CameraFrame> frame = source_->Next();
-    TakeNotes();
-    if (!frame) return frame;
-    frame->left = table_->Interpolate(frame->left);
-    if (!frame->right.empty()) frame->right = table_->Interpolate(frame->right);
-    if (!frame->depth.empty()) frame->depth = table_->Nearest(frame->depth);
-    return frame;
-  }
   ColorReader TakeColor() override {
-    ColorReader read = source_->TakeColor();
+    ColorReader read = source().TakeColor();
     if (!read) return read;
     return [table = table_, read = std::move(read)] {
       ColorImage image = read();
       return image.empty() ? image : table->Interpolate(image);
     };
   }
-  bool HasNext() override { return source_->HasNext(); }
-  void SkipTo(FrameId frame) override { source_->SkipTo(frame); }
-  bool is_live() const override { return source_->is_live(); }
-  std::vector<std::string> TakeEvents() override { return source_->TakeEvents(); }
-  const std::vector<std::string>& notes() const override { return notes_; }
-  std::string loss() const override { return source_->loss(); }
 
  private:
-  // Those that came since; the first is its own.
-  void TakeNotes() {
-    const std::vector<std::string>& all = source_->notes();
-    notes_.insert(notes_.end(), all.begin() + static_cast<ptrdiff_t>(notes_.size() - 1), all.end());
+  void Change(CameraFrame& frame) const override {
+    frame.left = table_->Interpolate(frame.left);
+    if (!frame.right.empty()) frame.right = table_->Interpolate(frame.right);
+    if (!frame.depth.empty()) frame.depth = table_->Nearest(frame.depth);
   }
 
-  const std::unique_ptr<FrameSource> source_;
   const CameraCalibration calibration_;
   const std::shared_ptr<const RemapTable> table_;  // color readers, which may outlive a live source, have it too
-  std::vector<std::string> notes_;
 };
 
 }  // namespace
 
 std::unique_ptr<FrameSource> DoubleIfSmall(std::unique_ptr<FrameSource> source, double min_focal_px) {
   const bool is_small = source->calibration().fx_px < min_focal_px;
-  return is_small ? std::make_unique<DoubledSource>(std::move(source)) : std::move(source);
+  if (!is_small) return source;
+  std::string note = NoteOf(source->calibration());
+  return std::make_unique<DoubledSource>(std::move(source), std::move(note));
 }
 
 }  // namespace tessera

@@ -3,6 +3,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/errors.h"
+#include "datasets/aligned_source.h"
 #include "datasets/doubled_source.h"
 #include "datasets/recording.h"
 #include "datasets/simulated_source.h"
@@ -43,7 +44,7 @@ SensorType ParseSensor(const std::string& text) {
 
 std::unique_ptr<FrameSource> OpenSource(const SourceOptions& options) {
   cv::setNumThreads(1);  // parallelism is between processes; the cores belong to the extractors
-  return DoubleIfSmall(Open(options), options.min_focal_px);
+  return DoubleIfSmall(AlignRows(Open(options), options, Open), options.min_focal_px);
 }
 
 }  // namespace tessera

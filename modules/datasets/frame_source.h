@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "features/right_turn.h"
 #include "geometry/camera_frame.h"
 
 namespace tessera {
@@ -57,6 +58,9 @@ class FrameSource {
   virtual std::vector<std::string> TakeEvents() { return {}; }
   // Notes for the user about how the source was read, one sentence each; more may come with each frame.
   virtual const std::vector<std::string>& notes() const = 0;
+  // By how much the right camera of a pair was found to be turned against its calibration; right images are put
+  // straight.
+  virtual RightTurn right_turn() const { return {}; }
   // What is missing from the source, in one sentence; empty: nothing.
   virtual std::string loss() const { return ""; }
 };

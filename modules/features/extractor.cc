@@ -109,11 +109,11 @@ void Extractor::DescribeCandidates(TileFeatures& features) {
 void Extractor::MatchCandidates(const FeatureOptions& options) {
   for (Candidate& candidate : candidates_) {
     const auto level = static_cast<size_t>(candidate.level);
-    const std::optional<int> right_x =
-        matcher_.Match(left_[level], right_[level], candidate.x, candidate.y, LevelDisparity(options, candidate.level));
-    if (!right_x) continue;
+    const std::optional<StereoMatch> match = matcher_.Match(left_[level], right_[level], candidate.x, candidate.y,
+                                                            candidate.y, LevelDisparity(options, candidate.level));
+    if (!match) continue;
     // The disparity is that of the pixel; the corner beside it is seen as far beside in both images.
-    const double corner_x = static_cast<double>(*right_x) / StereoMatcher::kSubpixels +
+    const double corner_x = static_cast<double>(match->position) / StereoMatcher::kSubpixels +
                             static_cast<double>(candidate.offset_x) / kCornerSubpixels;
     candidate.right_x_px = LevelZeroPosition(corner_x, candidate.level);
   }

@@ -37,14 +37,14 @@ int ParabolaMinimum(int before, int best, int after) {
 
 }  // namespace
 
-void StereoMatcher::ComputeDifferences(const LevelImage& left, const LevelImage& right, int x, int y, int first,
-                                       int count) {
+void StereoMatcher::ComputeDifferences(const LevelImage& left, const LevelImage& right, int x, int y, int right_y,
+                                       int first, int count) {
   int left_sum = 0;
   std::array<uint16_t, kMaxPositions + kWindow> column_sums{};  // of the columns first - kRadius, ...
   const auto num_columns = static_cast<size_t>(count + kWindow - 1);
   for (int j = -kRadius; j <= kRadius; ++j) {
     const uint8_t* left_row = left.At(x - kRadius, y + j);
-    const uint8_t* right_row = right.At(first - kRadius, y + j);
+    const uint8_t* right_row = right.At(first - kRadius, right_y + j);
     for (int i = 0; i < kWindow; ++i) left_sum += left_row[i];
     for (size_t i = 0; i < num_columns; ++i) column_sums[i] = static_cast<uint16_t>(column_sums[i] + right_row[i]);
   }
@@ -60,7 +60,8 @@ void StereoMatcher::ComputeDifferences(const LevelImage& left, const LevelImage&
   }
 }
 
-void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count) {
+void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int right_y, int first,
+                                 int count) {
   const U8x32 limit = simd::Fill8(kMaxDifference);
   for (int p = 0; p < count; p += 32) {
     const U8x32 brighter = simd::Load8(brighter_.data() + p), darker = simd::Load8(darker_.data() + p);
@@ -68,7 +69,7 @@ void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right
     U16x16 odd = simd::Fill16(0);
     for (int j = -kRadius; j <= kRadius; ++j) {
       const uint8_t* left_row = left.At(x - kRadius, y + j);
-      const uint8_t* right_row = right.At(first + p - kRadius, y + j);
+      const uint8_t* right_row = right.At(first + p - kRadius, right_y + j);
       U8x32 row_cost = simd::Fill8(0);
       for (int i = 0; i < kWindow; ++i) {
         const U8x32 a = simd::Fill8(left_row[i]);
@@ -90,13 +91,13 @@ void StereoMatcher::ComputeCosts(const LevelImage& left, const LevelImage& right
   }
 }
 
-std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage& right, int x, int y,
-                                        int max_disparity) {
+std::optional<StereoMatch> StereoMatcher::Match(const LevelImage& left, const LevelImage& right, int x, int y,
+                                                int right_y, int max_disparity) {
   // One more position at both ends, so that the first and the last one have neighbors.
   const int first = std::max(x - max_disparity - 1, kRadius);
   const int count = x + 2 - first;
-  ComputeDifferences(left, right, x, y, first, count);
-  ComputeCosts(left, right, x, y, first, count);
+  ComputeDifferences(left, right, x, y, right_y, first, count);
+  ComputeCosts(left, right, x, y, right_y, first, count);
   const auto begin = costs_.begin();
   const auto end = begin + count;
   const auto best = std::min_element(begin + 1, end - 1);
@@ -107,8 +108,8 @@ std::optional<int> StereoMatcher::Match(const LevelImage& left, const LevelImage
   const int other = std::min(second(begin, best - std::min<ptrdiff_t>(best - begin, kNeighborhood)),
                              second(best + std::min<ptrdiff_t>(end - best, kNeighborhood + 1), end));
   if (*best * kUniqueDenominator > other * kUniqueNumerator) return std::nullopt;
-  const int position = first + static_cast<int>(best - begin);
-  return std::min(position * kSubpixels + ParabolaMinimum(best[-1], *best, best[1]), x * kSubpixels);
+  const int position = (first + static_cast<int>(best - begin)) * kSubpixels;
+  return StereoMatch{std::min(position + ParabolaMinimum(best[-1], *best, best[1]), x * kSubpixels), *best};
 }
 
 }  // namespace tessera

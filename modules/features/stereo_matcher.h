@@ -9,24 +9,31 @@
 
 namespace tessera {
 
+struct StereoMatch {
+  int position = 0;  // in the right image, 1/64 px of the level
+  int cost = 0;      // of the window
+};
+
 class StereoMatcher {
  public:
   static constexpr int kSubpixels = 64;  // positions are counted in 1/64 px
 
-  // Position of the pixel (x, y) of the left image in the right image, in 1/64 px of the level, at most max_disparity
+  // Where the pixel (x, y) of the left image is seen in the row right_y of the right image, at most max_disparity
   // to the left of x; nullopt if no position matches well, or more than one does. Compares windows of 11 x 11 px by
   //
-  //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, y + j) - difference(p)|, 23)
+  //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, right_y + j) - difference(p)|, 23)
   //   difference(p) = mean of the left window - mean of the right one
   //
   // so that single pixels that differ much (occlusions, highlights) weigh no more than others, and the brightness of
   // the two images doesn't matter (each has its exposure, its lens is darker at the edges).
-  // The left image must hold kStereoRadiusPx around (x, y), the right one what LevelPlan::right says.
-  std::optional<int> Match(const LevelImage& left, const LevelImage& right, int x, int y, int max_disparity);
+  // The left image must hold kStereoRadiusPx around (x, y), the right one around the row what LevelPlan::right says.
+  std::optional<StereoMatch> Match(const LevelImage& left, const LevelImage& right, int x, int y, int right_y,
+                                   int max_disparity);
 
  private:
-  void ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
-  void ComputeDifferences(const LevelImage& left, const LevelImage& right, int x, int y, int first, int count);
+  void ComputeCosts(const LevelImage& left, const LevelImage& right, int x, int y, int right_y, int first, int count);
+  void ComputeDifferences(const LevelImage& left, const LevelImage& right, int x, int y, int right_y, int first,
+                          int count);
 
   static constexpr size_t kMaxPositions = 1120;
   std::array<uint16_t, kMaxPositions> costs_;  // of the positions first, first + 1, ... of the right image

@@ -80,6 +80,7 @@ CameraStage::CameraStage(StageContext& context)
     if (const auto report = session_.Watch(context_.now_us())) context_.ReportError(*report);
     TellEvents();
   });
+  TellRightTurn();
   context.SetValue("num_frames", static_cast<double>(session_.source().num_frames().value_or(0)));
   calibration_.Publish(session_.source().calibration());
 }
@@ -90,6 +91,13 @@ CameraStage::~CameraStage() {
   } catch (const std::exception&) {
     // Nobody is left to tell; the dispatcher's own watch notices a stream without an end.
   }
+}
+
+void CameraStage::TellRightTurn() {
+  constexpr double kDegree = 0.0174532925;
+  const RightTurn turn = session_.source().right_turn();
+  context_.SetValue("right_pitch_deg", turn.pitch / kDegree);
+  context_.SetValue("right_twist_deg", turn.twist / kDegree);
 }
 
 void CameraStage::TellEvents() {

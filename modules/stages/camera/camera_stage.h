@@ -18,6 +18,7 @@ class CameraStage {
 
  private:
   bool Step();
+  void TellRightTurn();
   void TellEvents();
   void Do(const CameraActions& actions);
 

@@ -32,6 +32,7 @@ def headline(result: Result) -> list[str]:
         _loops(result),
         _drift(result),
         _lens(result),
+        _right_camera(result),
         _readout(result),
         _own_body(result),
         _repeated(result),
@@ -111,6 +112,19 @@ def _lens(result: Result) -> str:
     return (
         f"Focal lengths {focal_words(error)} than the calibration's{edges} explain the images better, and were used: "
         "calibrate the camera anew."
+    )
+
+
+def _right_camera(result: Result) -> str:
+    """How the rows of a stereo pair's images were put straight."""
+    values = _values(result, "camera")
+    pitch_deg, twist_deg = values.get("right_pitch_deg") or 0.0, values.get("right_twist_deg") or 0.0
+    if not (pitch_deg or twist_deg):
+        return ""
+    looks = f"looks {abs(pitch_deg):.2f}\N{DEGREE SIGN} {'higher' if pitch_deg >= 0 else 'lower'}"
+    return (
+        f"The right camera {looks} than its calibration says, and is turned by {twist_deg:.2f}\N{DEGREE SIGN} about "
+        "its axis: its images were put straight; calibrate the pair anew."
     )
 
 

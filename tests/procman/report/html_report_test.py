@@ -191,6 +191,18 @@ def test_a_right_camera_that_is_late_is_told(tmp_path: Path) -> None:
         assert len(told) == bool(words) and (not told or told[0].startswith(words))
 
 
+def test_a_right_camera_that_stands_otherwise_is_told(tmp_path: Path) -> None:
+    for pitch_deg, twist_deg, words in [
+        (0.204, -0.013, "looks 0.20° higher than its calibration says, and is turned by -0.01° about its axis"),
+        (-0.1, 0.5, "looks 0.10° lower than its calibration says, and is turned by 0.50° about its axis"),
+        (0.0, 0.0, ""),
+    ]:
+        values = {"camera": {"right_pitch_deg": pitch_deg, "right_twist_deg": twist_deg}}
+        folder = write_run(tmp_path / f"{pitch_deg}", sensor="stereo", stage_values=values)
+        told = [sentence for sentence in headline(read_run(folder)) if "put straight" in sentence]
+        assert len(told) == bool(words) and (not told or words in told[0])
+
+
 def test_what_moves_with_the_camera_is_told(tmp_path: Path) -> None:
     for share, words in [(0.057, "6 % of the image moves with the camera"), (0.0, "")]:
         folder = write_run(tmp_path / f"{share}", sensor="rgbd", stage_values={"tracker": {"own_body_share": share}})
