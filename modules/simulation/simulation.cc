@@ -9,6 +9,7 @@
 #include "simulation/country.h"
 #include "simulation/depth_sensor.h"
 #include "simulation/highway.h"
+#include "simulation/survey.h"
 
 namespace tessera {
 namespace {
@@ -42,6 +43,7 @@ const CameraModel& ModelOf(Scene scene) {
     case Scene::kOffice:
       return kKinect;
     case Scene::kFlight:
+    case Scene::kSurvey:
       return kDroneCamera;
     default:
       return kCarCamera;
@@ -164,12 +166,12 @@ SimulationOptions ParseSimulation(const std::string& text) {
                                             {"room", Scene::kRoom},       {"country", Scene::kCountry},
                                             {"walk", Scene::kWalk},       {"desk", Scene::kDesk},
                                             {"office", Scene::kOffice},   {"robot", Scene::kRobot},
-                                            {"flight", Scene::kFlight}};
+                                            {"flight", Scene::kFlight},   {"survey", Scene::kSurvey}};
   const auto scene = scenes.find(name);
   if (scene == scenes.end()) {
     throw InputError("sim:" + name +
                      " is unknown: give sim:street, sim:street-short, sim:traffic, sim:highway, sim:room, sim:country, "
-                     "sim:walk, sim:desk, sim:office, sim:robot or sim:flight");
+                     "sim:walk, sim:desk, sim:office, sim:robot, sim:flight or sim:survey");
   }
   options.scene = scene->second;
   for (size_t begin = name.size(); begin < text.size();) {
@@ -245,6 +247,10 @@ Simulation::Simulation(const SimulationOptions& options, SensorType sensor)
     case Scene::kFlight:
       trajectory_ = std::make_unique<FlightTrajectory>(duration_s, options.speed, options.seed, options.bumps);
       world = BuildHall(options.seed);
+      break;
+    case Scene::kSurvey:
+      trajectory_ = std::make_unique<SurveyTrajectory>(options.speed, options.seed);
+      world = BuildFields(options.seed);
       break;
     case Scene::kWalk: {
       const StreetPlan plan = PlanStroll(options.seed, options.length_m);

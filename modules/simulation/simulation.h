@@ -25,7 +25,8 @@ struct SimulationOptions {
     kDesk,
     kOffice,
     kRobot,
-    kFlight
+    kFlight,
+    kSurvey
   };
   Scene scene = Scene::kStreet;
   uint32_t seed = 1;            // another seed, another town
