@@ -11,6 +11,9 @@ namespace {
 constexpr double kMinReadout_s = 0.005;  // a shorter one isn't worth a risk
 constexpr double kMinShare = 0.03;       // TimeOffset::ExplainedShare of how images are read
 constexpr int kMinFrames = 20;           // that have to tell it
+// Of rows from the top in mono: at once, or after so many frames.
+constexpr double kClearMonoShare = 0.02, kMinMonoShare = 0.005;
+constexpr int kMinMonoFrames = 80;
 
 struct Equations {
   TimeOffsetEquations down, across;
@@ -55,6 +58,10 @@ void ReadoutEstimator::Add(const TrackedFrame& frame, const CameraMotion& motion
   down_.Add(equations.down, used.down_s);
   across_.Add(equations.across, used.across_s);
   if (order_ == Order::kUnknown) order_ = FindOrder();
+  const bool is_mono = frame.view->calibration().sensor == SensorType::kMono;
+  const double min_mono_share = down_.num_frames() < kMinMonoFrames ? kClearMonoShare : kMinMonoShare;
+  const bool is_told = !is_mono || down_.ExplainedShare() >= min_mono_share;
+  rolls_ |= is_told && down_.value_s(kMinReadout_s) > 0.0;
 }
 
 ReadoutEstimator::Order ReadoutEstimator::FindOrder() const {
@@ -77,7 +84,7 @@ Readout ReadoutEstimator::readout() const {
     case Order::kUnknown:
       break;
   }
-  return {.down_s = std::max(0.0, down_s)};
+  return {.down_s = rolls_ ? std::max(0.0, down_s) : 0.0};
 }
 
 }  // namespace tessera

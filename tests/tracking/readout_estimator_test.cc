@@ -10,8 +10,6 @@
 namespace tessera {
 namespace {
 
-CameraCalibration Camera() { return VgaCamera(SensorType::kMono); }
-
 CameraMotion Turning() { return {Eigen::Vector3d::Zero(), {0.0, 1.0, 0.0}}; }
 
 // Frames of a camera at the world's origin that turns by rates that change from frame to frame. It sees points that are
@@ -28,14 +26,14 @@ class ReadoutEstimatorTest : public ::testing::Test {
 
   TrackedFrame FrameOf(const CameraMotion& motion, const Readout& readout) {
     FeatureFrame features;
-    features.calibration = Camera();
+    features.calibration = camera_;
     std::vector<SeenPoint> points;
     std::vector<double> depths;
     for (int i = 0; i < 200; ++i) {
       const Eigen::Vector2d pixel(640.0 * uniform_(random_), 480.0 * uniform_(random_));
-      const Eigen::Vector3d point = (1.0 + 3.0 * uniform_(random_)) * Camera().Ray(pixel);
-      const double time_s = ReadTime(readout, Camera(), pixel);
-      const Eigen::Vector2d seen = Camera().Project(ExpSO3(-time_s * motion.turn_rate) * point);
+      const Eigen::Vector3d point = (1.0 + 3.0 * uniform_(random_)) * camera_.Ray(pixel);
+      const double time_s = ReadTime(readout, camera_, pixel);
+      const Eigen::Vector2d seen = camera_.Project(ExpSO3(-time_s * motion.turn_rate) * point);
       Keypoint keypoint;
       keypoint.x_px = static_cast<float>(seen.x() + noise_px_ * gaussian_(random_));
       keypoint.y_px = static_cast<float>(seen.y() + noise_px_ * gaussian_(random_));
@@ -51,6 +49,7 @@ class ReadoutEstimatorTest : public ::testing::Test {
     return frame;
   }
 
+  CameraCalibration camera_ = VgaCamera(SensorType::kMono);
   double noise_px_ = 0.5;
   ReadoutEstimator estimator_;
   std::mt19937 random_{7};
@@ -84,6 +83,16 @@ TEST_F(ReadoutEstimatorTest, ColumnsThatExplainLittleOfWhatIsSeenArentReadSo) {
   noise_px_ = 10.0;
   Show(400, {.across_s = 0.012});
   EXPECT_EQ(estimator_.readout(), Readout{});
+}
+
+// As over a plane, where a map that only images made bends with the way.
+TEST_F(ReadoutEstimatorTest, InMonoRowsThatExplainLittleArentReadSo) {
+  noise_px_ = 20.0;
+  Show(400, {.down_s = 0.012});
+  EXPECT_EQ(estimator_.readout(), Readout{});
+  camera_.sensor = SensorType::kRgbd;
+  Show(400, {.down_s = 0.012});
+  EXPECT_NEAR(estimator_.readout().down_s, 0.012, 0.004);
 }
 
 TEST_F(ReadoutEstimatorTest, HowImagesAreReadStaysAsItWasFound) {
