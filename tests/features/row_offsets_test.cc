@@ -4,29 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+
+#include "support/wave_image.h"
 
 namespace tessera {
 namespace {
 
 constexpr int kWidth = 400, kHeight = 200;
 
-// Smooth bumps without a period, whose value between pixels is known.
-double TextureAt(double x, double y) {
-  const double waves = std::sin(0.31 * x + 0.11 * y) + std::sin(0.17 * x - 0.27 * y + 1.0) +
-                       std::sin(0.05 * x + 0.37 * y + 2.0) + std::sin(0.0021 * x * y);
-  return 110.0 + 22.0 * waves;
-}
-
-// What stands at (x, y) of the left image stands at (x - 20, y + down_px) of this one.
 GrayImage ImageMoved(double left_px, double down_px, double brightness = 1.0) {
-  GrayImage image(kWidth, kHeight);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      image.row(y)[x] = static_cast<uint8_t>(std::lround(brightness * TextureAt(x + left_px, y - down_px)));
-    }
-  }
-  return image;
+  return WaveImage(kWidth, kHeight, left_px, down_px, brightness);
 }
 
 double MedianOf(std::vector<RowOffset> offsets) {
