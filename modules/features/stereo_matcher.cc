@@ -40,7 +40,8 @@ int MeetingOfLines(int before, int best, int after) {
 //
 //   minimize sum r^2,  r = right(p + i, .) - left(x + i, .) - their mean:   p' = p - (sum g r) / (sum g^2)
 //
-// Pixels that differ much are left out, as in the costs.
+// Pixels that differ much are left out, as in the costs. A whole position makes nothing of the pixel to the right of
+// the window, which a tile may lack.
 int Refined(const LevelImage& left, const LevelImage& right, int x, int y, int right_y, int position) {
   constexpr int kGray = 16;  // intensities are counted in 1/16
   constexpr int kShare = StereoMatcher::kSubpixels / kGray;
@@ -70,6 +71,7 @@ int Refined(const LevelImage& left, const LevelImage& right, int x, int y, int r
     }
   }
   if (by_gradient == 0) return position;
+  // r in 1/16 and 2 g, in 1/64 px: 64 (sum 2 g r / 32) / (sum (2 g)^2 / 4).
   const int step = -(2 * kShare * by_residual) / by_gradient;
   return position + std::clamp(step, -StereoMatcher::kSubpixels / 2, StereoMatcher::kSubpixels / 2);
 }
