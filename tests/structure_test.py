@@ -9,7 +9,6 @@ COVERED_BY_OTHERS = {
     "datasets/stream_source.h": "opened by frame_source_test as video:FILE",
     "datasets/video_input.h": "opened by frame_source_test as video:FILE",
     "features/simd.h": "every path of it runs in steps_test",
-    "features/stereo_matcher.h": "run by lossless_test on stereo pairs",
     "geometry/keypoint_noise.h": "constants",
     "geometry/similarity_problem.h": "inside of similarity_test",
     "loop_closing/relocalization.h": "relocalization_test asks it by the loop closer",
