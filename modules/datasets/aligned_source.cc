@@ -19,7 +19,7 @@ constexpr std::array<int64_t, 4> kMeasuredFrames{0, 8, 16, 24};
 constexpr int kFarthestRow = 12;  // that is searched
 constexpr double kMinOffset_px = 1.0 / 3.0;
 
-// Offsets by pair; none of images that can't be read, which the run itself will tell of.
+// Offsets by pair; fewer pairs of a source that is short.
 std::vector<std::vector<RowOffset>> MeasurePairs(FrameSource& source) {
   std::vector<std::vector<RowOffset>> pairs;
   for (const int64_t wanted : kMeasuredFrames) {
@@ -42,7 +42,7 @@ std::optional<RightTurn> Measure(const SourceOptions& options,
     const std::unique_ptr<FrameSource> source = open(all);
     return FindRightTurn(MeasurePairs(*source), source->calibration());
   } catch (const InputError&) {
-    return std::nullopt;  // the wanted frames may be readable all the same
+    return std::nullopt;  // the wanted frames may be readable all the same; if not, the run itself tells
   }
 }
 

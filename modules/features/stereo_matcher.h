@@ -19,13 +19,15 @@ class StereoMatcher {
   static constexpr int kSubpixels = 64;  // positions are counted in 1/64 px
 
   // Where the pixel (x, y) of the left image is seen in the row right_y of the right image, at most max_disparity
-  // to the left of x; nullopt if no position matches well, or more than one does. Compares windows of 11 x 11 px by
+  // to the left of x; nullopt if no position matches well, more than one does, or the best one has a better neighbor
+  // farther to the left than is searched. Compares windows of 11 x 11 px by
   //
   //   cost(p) = sum over the window of min(|left(x + i, y + j) - right(p + i, right_y + j) - difference(p)|, 23)
   //   difference(p) = mean of the left window - mean of the right one
   //
   // so that single pixels that differ much (occlusions, highlights) weigh no more than others, and the brightness of
-  // the two images doesn't matter (each has its exposure, its lens is darker at the edges).
+  // the two images doesn't matter (each has its exposure, its lens is darker at the edges). Between pixels the position
+  // follows from the costs of its neighbors, and from one step on the intensities.
   // The left image must hold kStereoRadiusPx around (x, y), the right one around the row what LevelPlan::right says.
   std::optional<StereoMatch> Match(const LevelImage& left, const LevelImage& right, int x, int y, int right_y,
                                    int max_disparity);
